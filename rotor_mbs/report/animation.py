@@ -33,7 +33,7 @@ def write_animation(results: Path, name: str, output: Path, magnified: float | N
 
     Parameters
     ----------
-    results, name : the file, and the name of the scene in it.
+    results, name : the file, and the name of the scene in it, or of the TOML file of the scene.
     output : the animation; its suffix gives the format.
     magnified : how many times the tip's distance from the pitch axis is drawn; None: so many that
         it is visible.
@@ -41,7 +41,8 @@ def write_animation(results: Path, name: str, output: Path, magnified: float | N
     Raises
     ------
     InputError
-        For a scene that the file does not have, and for a format that cannot be made.
+        For a scene that the file does not have, a format that cannot be made, or a scene without
+        angles.
     StoreError
         Where a file cannot be read or written.
     """

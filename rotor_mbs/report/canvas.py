@@ -1,5 +1,4 @@
-"""The only module that imports matplotlib: panels, the styles of pages and manuscripts,
-reproducible output."""
+"""Draw with matplotlib, which no other module imports: panels, styles, reproducible files."""
 
 from __future__ import annotations
 
@@ -33,8 +32,9 @@ from rotor_mbs.scenario.toml_file import file_path
 def _unaffected_by_environment() -> Iterator[None]:
     """Import matplotlib in the block whatever the environment says of backends and folders.
 
-    No backend is needed here, and an unknown one in MPLBACKEND would be an error. A home that
-    cannot be written is told once in every process, though a temporary folder serves as well.
+    No backend is needed here, and an unknown one in MPLBACKEND would be an error. matplotlib warns
+    in every process about a home that cannot be written, though it then uses a temporary folder;
+    the block suppresses this warning.
     """
     backend = os.environ.pop("MPLBACKEND", None)
     logger = logging.getLogger("matplotlib")
@@ -73,7 +73,7 @@ _PAGE_STYLE, _PRINT_STYLE = (  # without matplotlib's defaults
 
 @dataclass(frozen=True)
 class Panels:
-    """A matplotlib figure and its axes, from top to bottom. Shown by a notebook."""
+    """A matplotlib figure and its axes, from top to bottom, which a notebook shows as SVG."""
 
     figure: Figure
     axes: list[Any]
@@ -106,10 +106,16 @@ class Panels:
         return self
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Save as PDF, SVG or PNG, by the ending of `path`.
+        """Save the figure as PDF, SVG or PNG, by the ending of `path`.
 
-        Raises InputError for another one, StoreError, and TypeError if `path` is neither text nor a
-        path.
+        Raises
+        ------
+        InputError
+            For another ending.
+        StoreError
+            Where the file cannot be written.
+        TypeError
+            If `path` is neither text nor a path.
         """
         target = file_path(path)
         kind = target.suffix.removeprefix(".")
@@ -120,8 +126,13 @@ class Panels:
 
 
 def panels(heights: tuple[float, ...], x_label: str) -> Panels:
-    """Build panels one below the other: heights in inches, the top one first; the last one has the
-    label of x."""
+    """Build panels one below the other with a common horizontal axis.
+
+    Parameters
+    ----------
+    heights : of the panels, in, the top one first.
+    x_label : label of the horizontal axis, below the last panel.
+    """
     figure = Figure(figsize=(WIDTH, sum(heights) + 0.6), facecolor="white")
     with style():
         axes = figure.subplots(len(heights), squeeze=False, sharex=True, height_ratios=heights)[
@@ -137,7 +148,13 @@ def panels(heights: tuple[float, ...], x_label: str) -> Panels:
 
 
 def grid(rows: int, columns: int, height: float) -> Panels:
-    """Return axes row by row for a manuscript, `height` inches each, at a journal's page width."""
+    """Build axes for a manuscript, row by row, at a journal's page width.
+
+    Parameters
+    ----------
+    rows, columns : number of axes in each direction.
+    height : of each of them, in.
+    """
     with style(for_print=True):
         whole = rows * height + 1.25
         figure = Figure(figsize=(PRINT_WIDTH, whole), facecolor="white")
@@ -150,8 +167,10 @@ def grid(rows: int, columns: int, height: float) -> Panels:
 
 
 def squares(count: int) -> Panels:
-    """Build axes side by side with equal scales and no frame, 420 pixels each, below room for two
-    lines of text."""
+    """Build `count` axes side by side with equal scales and no frame.
+
+    Each has 420 by 420 pixels; above them is room for two lines of text.
+    """
     with style():
         figure = Figure(figsize=(4.2 * count, 4.6), dpi=100, facecolor="white")
         axes = [
@@ -164,23 +183,29 @@ def squares(count: int) -> Panels:
 
 
 def pixels(figure: Figure) -> NDArray[np.uint8]:
-    """Return the figure as it is now as an image: (height, width, 3) red, green and blue."""
+    """Return the figure as it is now as an image, (height, width, 3): red, green and blue."""
     canvas: Any = FigureCanvasAgg(figure)
     canvas.draw()
     return np.asarray(canvas.buffer_rgba())[..., :3]
 
 
 def style(*, for_print: bool = False) -> AbstractContextManager[None]:
-    """Return a context in which figures are drawn in the style of the pages, or in that of
-    manuscripts."""
+    """Return a context with the style of the pages, or that of manuscripts, for drawing."""
     return matplotlib.rc_context(_PRINT_STYLE if for_print else _PAGE_STYLE)
 
 
 def encoded(
     figure: Figure, kind: str, *, for_print: bool = True, title: str = "", description: str = ""
 ) -> bytes:
-    """Return the figure as a file of one of KINDS, with a title and a description; the same bytes
-    every time."""
+    """Return the figure as a file, the same bytes every time.
+
+    Parameters
+    ----------
+    figure : what is drawn.
+    kind : one of KINDS.
+    for_print : whether in the style of manuscripts, with the mark of this program's files.
+    title, description : metadata of the file; "" for none.
+    """
     metadata: dict[str, Any] = {
         "pdf": {"CreationDate": None},
         "svg": {"Date": None},
@@ -217,8 +242,13 @@ _STILL_POINTS = 300  # of a curve: about one a pixel
 
 
 def still(plot: Plot, name: str) -> Markup:
-    """Return a picture of a plot for a page without scripts, an `svg` element; names in it begin
-    with `name`."""
+    """Return a picture of a plot for a page without scripts, an `svg` element.
+
+    Parameters
+    ----------
+    plot : of curves with several rows the first row is drawn.
+    name : begins the names in the picture; unique on the page.
+    """
     height = plot.height
     with style():
         figure = Figure(figsize=(_STILL_WIDTH, height / 100.0), dpi=100, facecolor="none")
@@ -262,7 +292,14 @@ def still(plot: Plot, name: str) -> Markup:
 
 
 def path_picture(panels: Panels, name: str, caption: str) -> Markup:
-    """Return a picture of paths for a page, with its caption; `name` is unique on the page."""
+    """Return a picture of paths for a page, a `figure` element with its caption.
+
+    Parameters
+    ----------
+    panels : the drawing; its backgrounds are made transparent.
+    name : begins the names in the picture; unique on the page.
+    caption : text above the picture.
+    """
     for patch in (panels.figure.patch, *(axes.patch for axes in panels.figure.axes)):
         patch.set_visible(False)
     width, height = (72.0 * size for size in panels.figure.get_size_inches())
@@ -276,8 +313,16 @@ def path_picture(panels: Panels, name: str, caption: str) -> Markup:
 
 
 def inside_of(file: bytes, name: str) -> str:
-    """Return what is inside the `svg` element of a file, for a page: names of its own, variables
-    for the palette."""
+    """Return what is inside the `svg` element of a file, to be placed in a page.
+
+    Coordinates are rounded to a tenth, and colours of the palette become variables of the style
+    sheet, so that a dark page has its own.
+
+    Parameters
+    ----------
+    file : an SVG file by matplotlib.
+    name : begins the names in it, which must be unique on the page.
+    """
     _, _, text = file.decode().partition("<svg")
     _, _, text = text.partition(">")
     text = _SUPERFLUOUS.sub("", text.rpartition("</svg>")[0]).replace("\n", "")
@@ -291,8 +336,16 @@ def inside_of(file: bytes, name: str) -> str:
 
 
 def extremes(values: Any, most: int) -> NDArray[np.int64]:
-    """Return which samples to draw: the ends, and the smallest and largest of equal intervals,
-    about `most` in all."""
+    """Return the indices of the samples to draw, ascending.
+
+    They are the ends, and the smallest and the largest finite sample of equal intervals, so that no
+    peak is lost.
+
+    Parameters
+    ----------
+    values : (n,).
+    most : approximate number of samples; where there are no more, all are returned.
+    """
     count = len(values)
     if count <= most:
         return np.arange(count)
@@ -305,8 +358,13 @@ def extremes(values: Any, most: int) -> NDArray[np.int64]:
 
 
 def log_axis(axes: Any, lowest: float, highest: float) -> None:
-    """Make the vertical axis logarithmic over whole decades, labelled 10⁻¹²; at most eight
-    labels."""
+    """Make the vertical axis logarithmic over whole decades, with at most eight labels.
+
+    Parameters
+    ----------
+    axes : of matplotlib.
+    lowest, highest : positive values that the axis includes.
+    """
     low, high = math.floor(math.log10(lowest)), math.ceil(math.log10(highest))
     high = max(high, low + 1)
     # The limits first: a range found by the axes themselves may overflow.
@@ -316,7 +374,7 @@ def log_axis(axes: Any, lowest: float, highest: float) -> None:
 
 
 def ticks(axis: Any, labels: Mapping[float, str]) -> None:
-    """Label an axis at these places and no others.
+    """Label an axis at the places of `labels` and no others.
 
     `set_ticks` would make objects for all of them at once, which is slow.
     """
@@ -326,8 +384,16 @@ def ticks(axis: Any, labels: Mapping[float, str]) -> None:
 
 
 def curve(axes: Any, x: Any, y: Any, look: Look, width: float = 1.2, **more: Any) -> None:
-    """Draw a line, with markers that are white inside where the look has them; its label stands in
-    the legend."""
+    """Draw a line, with its label in the legend, and with markers that are white inside.
+
+    Parameters
+    ----------
+    axes : of matplotlib.
+    x, y : (n,) each.
+    look : colour, line, marker, and label; "" for none in the legend.
+    width : of the line, points.
+    more : further options of matplotlib's `plot`.
+    """
     axes.plot(
         x,
         y,

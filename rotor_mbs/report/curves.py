@@ -21,12 +21,12 @@ _LARGEST = 3.0e38
 class CurveStore:
     """Columns of numbers for the script of a page.
 
-    A column is described by where it lies: {"at": [first, count]} in numbers from the beginning, in
-    a table of several runs [first, count, stride], with the stride from a run to the next; "from":
-    a number to be added to each.
+    The description of a column tells where it lies. "at" is [first, count], in numbers from the
+    beginning; for a table of several runs [first, count, stride], with the stride from a run to the
+    next. "from", if there is one, is a number to be added to each value.
 
-    every : of columns that are long only so many-th samples are stored, so that a page does not
-        become too large.
+    every : of long columns only one in so many samples is stored, so that a page does not become
+    too large.
     """
 
     def __init__(self, every: int = 1) -> None:

@@ -1,5 +1,7 @@
-"""What pages are made of: sentences, facts, plots, tables, sections. Plain data; templates turn
-them into HTML."""
+"""Define what pages are made of: sentences, facts, plots, tables, sections.
+
+All are plain data; templates turn them into HTML.
+"""
 
 from __future__ import annotations
 
@@ -28,7 +30,7 @@ class TableCell:
     href : address of a link.
     note, note_language : small text below, and its language where it is not English.
     mark : classes of the whole cell.
-    title : what a pointer on it, or a screen reader, is told.
+    title : text that appears under the pointer and that a screen reader reads.
     order : the number by which the column is sorted; None: by the text.
     picture : a drawing above the text.
     """
@@ -49,10 +51,11 @@ Row = Sequence[TableCell | str]
 
 @dataclass(frozen=True)
 class PageTable:
-    """A table. The first cell of a row is its heading; a column in which no row has anything is
-    left out.
+    """A table. The first cell of a row is its heading; an empty column is left out.
 
     caption : for a screen reader.
+    head : headings of the columns.
+    rows : as many cells each as there are headings.
     wide : places of the columns that a narrow page does not show.
     sortable : whether a click on a heading sorts the rows.
     """
@@ -65,8 +68,12 @@ class PageTable:
     kind: str = field(default="table", init=False)
 
     def columns(self) -> list[tuple[int, TableCell | str, str]]:
-        """Return place, heading and classes ("n": numbers, on the right) of each column that is
-        shown."""
+        """Return place, heading and classes of each column that is shown.
+
+        The class "n" aligns numbers on the right; it is that of a column, but for the first, of
+        which more than half of the texts begin with a digit. The class "wide" hides a column on a
+        narrow page.
+        """
         shown = []
         for place, heading in enumerate(self.head):
             texts = []
@@ -93,9 +100,12 @@ class PageTable:
 
 @dataclass(frozen=True)
 class Horizontal:
-    """The horizontal axis of plots. Plots with the same name are zoomed and read together.
+    """The horizontal axis of plots. Plots whose axes have one name are zoomed and read together.
 
-    name, unit : "time" and "s"; symbol : what stands before a value that is read, "t".
+    name, unit : such as "time" and "s".
+    symbol : what stands before a value that is read, "t".
+    first, last : the range.
+    log : whether the axis is logarithmic.
     """
 
     name: str
@@ -138,12 +148,15 @@ class Mark:
 class Plot:
     """A plot that the page's script draws.
 
-    name, unit : what is on the vertical axis; note : more of it, in small letters.
+    name, unit : of the quantity on the vertical axis.
+    x : the horizontal axis.
     height : of the drawing, px.
+    note : more of the vertical axis, in small letters.
     log : whether the vertical axis is logarithmic; values that are not positive are gaps.
     clip : range beyond which curves are cut off, until the reader asks for it; None: there is none.
+    marks : lines across the plot.
     least : a smaller range of the values is rounding error and not magnified.
-    still : whether a picture of it stands there for a page without scripts.
+    still : whether there is a picture of it for a page without scripts.
     """
 
     name: str
@@ -160,7 +173,12 @@ class Plot:
     kind: str = field(default="plot", init=False)
 
     def described(self, store: CurveStore) -> dict[str, Any]:
-        """Return what the script needs, as JSON; the numbers go to the store."""
+        """Return what the script needs, ready for JSON; the numbers go to the store.
+
+        Parameters
+        ----------
+        store : takes the columns of all curves; its step also divides the places of breaks.
+        """
         x = self.x
         plot: dict[str, Any] = {
             "name": self.name,
@@ -197,8 +215,10 @@ class Plot:
 
 @dataclass(frozen=True)
 class Legend:
-    """The curves of a section: (key, look) each. Buttons that switch them; without keys a mere
-    list."""
+    """The curves of a section: (key, look) each.
+
+    Buttons switch the curves; a legend whose keys are empty is a mere list.
+    """
 
     items: Sequence[tuple[str, Look]]
     kind: str = field(default="legend", init=False)
@@ -239,8 +259,10 @@ class Listing:
 
 @dataclass(frozen=True)
 class Matrix:
-    """A matrix of formulas, with a text above: entries as printed, and the correct one where that
-    is faulty."""
+    """A matrix of formulas, with a text above.
+
+    rows : (entry as printed, the correct one) each; None where the printed one is correct.
+    """
 
     text: str
     rows: Sequence[Sequence[tuple[Markup, Markup | None]]]
@@ -249,8 +271,10 @@ class Matrix:
 
 @dataclass(frozen=True)
 class HeatMap:
-    """A map of runs over two parameters: a cell of equal size for each pair of values, in which the
-    script writes a quantity of the run.
+    """A map of runs over two parameters.
+
+    It has a cell of equal size for each pair of values, in which the script writes a quantity of
+    the run.
 
     quantities : names of what may be shown.
     columns, rows : values of the parameters as text, from left to right, from top to bottom.
@@ -291,8 +315,10 @@ Element = (
 
 @dataclass(frozen=True)
 class Grid:
-    """Cards side by side, `columns` in a row on a wide page; what is in a card stands one below the
-    other."""
+    """Cards side by side, `columns` in a row on a wide page.
+
+    The elements of a card are placed one below the other.
+    """
 
     columns: int
     cards: Sequence[Sequence[Element]]
@@ -301,7 +327,7 @@ class Grid:
 
 @dataclass(frozen=True)
 class Fold:
-    """What a click unfolds: a heading with a hint, and what is below."""
+    """A part that a click unfolds: a heading with a hint, and the elements below."""
 
     heading: str
     hint: str
@@ -325,8 +351,12 @@ class Section:
 
 @dataclass(frozen=True)
 class Fact:
-    """One of the numbers at the top of a page: what it is, the number, and what else is to know of
-    it."""
+    """One of the numbers at the top of a page.
+
+    name, value : what it is, and the number as text.
+    note : what else is to be known of it.
+    tone : "good" or "bad", the colour of the value.
+    """
 
     name: str
     value: str

@@ -1,7 +1,9 @@
-"""The paper's figures as files for a manuscript: the printed model, the corrected one, and how far
-the printed one and an independent computation are from it; each with a title, a description, and a
-caption in a file beside it. Scenes that are not the paper's, or were changed, have a figure of the
-same layout."""
+"""Write the paper's figures as files for a manuscript.
+
+A figure has the printed model, the corrected one, and how far the printed one and an independent
+computation are from it; it has a title, a description, and a caption in a file beside it. Scenes
+that are not the paper's, or were changed, have a figure of the same layout.
+"""
 
 from __future__ import annotations
 
@@ -35,7 +37,12 @@ _LOWEST = 1e-17  # rad, m: a smaller difference is a gap on the logarithmic axis
 
 
 class PaperFigure(NamedTuple):
-    """A figure of the paper."""
+    """A figure of the paper, or of one scene that is in none of them.
+
+    number : of the paper's figure, "11"; "" where it is not the paper's.
+    kind : MOTION, PATHS or TORQUES.
+    panels : (letter, scene) each; the letter is "" where there is none, and a torque for TORQUES.
+    """
 
     number: str
     kind: str
@@ -64,8 +71,10 @@ FIGURES = (
 
 
 def available(scenes: Mapping[str, StoredScene]) -> tuple[PaperFigure, ...]:
-    """Return the figures of which `scenes` has a panel, with these panels; none of a changed
-    scene."""
+    """Return the paper's figures of which `scenes` has a panel, with these panels alone.
+
+    A scene that differs from the shipped one has no panel.
+    """
     figures = []
     for figure in FIGURES:
         panels = tuple(
@@ -77,8 +86,7 @@ def available(scenes: Mapping[str, StoredScene]) -> tuple[PaperFigure, ...]:
 
 
 def all_figures(scenes: Mapping[str, StoredScene]) -> dict[str, PaperFigure]:
-    """Return the paper's figures by number, and one by name for each scene that is in none of
-    them."""
+    """Return the paper's figures by number, then one by name for each scene in none of them."""
     figures = {figure.number: figure for figure in available(scenes)}
     shown = {name for figure in figures.values() for _, name in figure.panels}
     for name in scenes:
@@ -88,8 +96,14 @@ def all_figures(scenes: Mapping[str, StoredScene]) -> dict[str, PaperFigure]:
 
 
 def compared_runs(scene: StoredScene) -> dict[str, StoredRun]:
-    """Return the scene's runs with angles and rates: "printed", "corrected", and "independent", by
-    another model than the corrected one's."""
+    """Return the scene's runs with angles and rates by "printed", "corrected", and "independent".
+
+    The independent run is the first one by another model than the corrected run's.
+
+    Parameters
+    ----------
+    scene : whose runs are chosen.
+    """
     candidates = scene.sides
     for name, run in scene.corrected_runs.items():
         method = find_method_or_none(name)
@@ -103,7 +117,11 @@ def compared_runs(scene: StoredScene) -> dict[str, StoredRun]:
 def panel_runs(
     figure: PaperFigure, scenes: Mapping[str, StoredScene]
 ) -> dict[str, dict[str, dict[str, StoredRun]]]:
-    """Return the runs of each picture by label: by letter of the row, then by model."""
+    """Return the runs of a figure: by letter of the row, then by model, then by label.
+
+    A figure of torques has one row, in which the labels are the torques. Where `scenes` lack paths,
+    a figure of paths has no run.
+    """
     rows: dict[str, dict[str, dict[str, StoredRun]]] = {}
     for label, name in figure.panels:
         letter = "" if figure.kind == TORQUES else label
@@ -117,7 +135,14 @@ def panel_runs(
 
 
 def draw(figure: PaperFigure, axes: Sequence[Any], runs: Mapping[str, StoredRun]) -> None:
-    """Draw one model on `axes`: one for paths, else two, position above velocity."""
+    """Draw one model of a figure.
+
+    Parameters
+    ----------
+    figure : tells the kind; paths are those of the first run alone.
+    axes : of matplotlib, one for paths, else two, position above velocity.
+    runs : of the model, by label.
+    """
     if figure.kind == PATHS:
         plots.draw_paths(axes[0], next(iter(runs.values())).array("tip"))
         return
@@ -144,8 +169,15 @@ def draw(figure: PaperFigure, axes: Sequence[Any], runs: Mapping[str, StoredRun]
 def draw_differences(
     figure: PaperFigure, axes: Sequence[Any], runs: Mapping[str, Mapping[str, StoredRun]]
 ) -> None:
-    """Draw how far the printed model and an independent computation are from the corrected model,
-    over time."""
+    """Draw how far the printed model and an independent computation are from the corrected one.
+
+    Parameters
+    ----------
+    figure : tells the kind.
+    axes : of matplotlib, one for paths, with distances of tips (m), else two, angles (rad) above
+        rates (rad/s); all have a logarithmic axis over time (s).
+    runs : by model, then by label; there is a corrected one.
+    """
     names = ("tip",) if figure.kind == PATHS else ("angles", "rates")
     units = {"tip": "tip distance (m)", "angles": "angle (rad)", "rates": "rate (rad/s)"}
     for panel, name in zip(axes, names, strict=True):
@@ -179,8 +211,14 @@ def draw_differences(
 
 
 def differences(name: str, run: StoredRun, other: StoredRun) -> Array:
-    """Return the largest difference over the coordinates, or distance of a tip, at the samples that
-    both have: (n,)."""
+    """Return the size of the difference of two runs at the samples that both have, (n,).
+
+    Parameters
+    ----------
+    name : "tip", of which it is the largest distance (m) of any blade; else "angles" or "rates",
+        the largest over the coordinates (rad, rad/s).
+    run, other : runs of one scene.
+    """
     n = min(run.samples, other.samples)
     gap = run.array(name)[:n] - other.array(name)[:n]
     sizes = np.linalg.norm(gap, axis=2) if name == "tip" else np.abs(gap)
@@ -189,8 +227,15 @@ def differences(name: str, run: StoredRun, other: StoredRun) -> Array:
 
 
 def composed(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> canvas.Panels:
-    """Return the whole figure: a column per model and one for the differences; position above
-    velocity, or a row per panel where paths are shown."""
+    """Return the whole figure: a column per model, and one for the differences.
+
+    Position is above velocity; of paths there is a row per panel.
+
+    Parameters
+    ----------
+    figure : to be drawn; some run of its scenes is stored.
+    scenes : by name, with the runs.
+    """
     pictures = panel_runs(figure, scenes)
     keys = [key for key in HEADINGS if any(key in row for row in pictures.values())]
     has_differences = any(len(row) > 1 and CORRECTED in row for row in pictures.values())
@@ -237,7 +282,7 @@ def composed(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> canvas.P
 
 
 def title_of(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> str:
-    """Return the title of a figure: which one of the paper it recomputes, else the scene's own."""
+    """Return the title of a figure: which one of the paper it recomputes, else of its scene."""
     if figure.number:
         return f"Figure {figure.number} of {_PAPER}, recomputed"
     scene = scenes[figure.panels[0][1]]
@@ -245,10 +290,15 @@ def title_of(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> str:
 
 
 def caption_of(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> str:
-    """Return the caption: what is shown, the scenes, by which methods with which settings, and
-    which of it is right.
+    """Return the caption of a figure, several lines.
 
-    A model is called right where the status of each of its runs is ok.
+    It says what is shown, the scenes, by which methods with which settings, and which of them is
+    right. A model is called right where the status of each of its runs is ok.
+
+    Parameters
+    ----------
+    figure : the figure.
+    scenes : by name, with the runs.
     """
     pictures = panel_runs(figure, scenes)
     what = {
@@ -318,8 +368,7 @@ def caption_of(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> str:
 
 
 def _scene_line(label: str, scene: StoredScene) -> str:
-    """Return what a scene is: its start, gravity, duration and samples, and whether it is the
-    paper's."""
+    """Return a line about a scene: its title, start, gravity, duration and samples."""
     initial = scene_tables(scene.scene)["initial"]
     angles, rates = (
         ", ".join(f"{value:.6g}" for value in initial[key]) for key in ("angles", "rates")
@@ -334,7 +383,7 @@ def _scene_line(label: str, scene: StoredScene) -> str:
 
 
 def _verdict(runs: Sequence[StoredRun]) -> str:
-    """Return "right" for runs of which every one is ok, else their statuses."""
+    """Return "right" for runs of which every one is ok, else "not verified" with the statuses."""
     statuses = [run.status.replace("_", " ") for run in runs if run.status != "ok"]
     if not statuses:
         return "right"
@@ -351,6 +400,12 @@ def _method_line(run: StoredRun) -> str:
 
 
 def _uncertainty(runs: Iterable[StoredRun]) -> float | None:
+    """Return the largest uncertainty of the angles of these runs, rad; None where none is known.
+
+    Parameters
+    ----------
+    runs : of one model.
+    """
     known = [
         float(run.array("angle_uncertainty").max())
         for run in runs
@@ -370,8 +425,14 @@ def _uncertainty(runs: Iterable[StoredRun]) -> float | None:
 def _largest_difference(
     pictures: Mapping[str, Mapping[str, Mapping[str, StoredRun]]],
 ) -> float | None:
-    """Return the largest angle difference of the independent computations from the corrected model:
-    rad."""
+    """Return the largest angle difference of independent runs from corrected ones, rad.
+
+    None where no two runs can be compared.
+
+    Parameters
+    ----------
+    pictures : the runs by row, model and label, see `panel_runs`.
+    """
     largest = []
     for row in pictures.values():
         for label, run in row.get(INDEPENDENT, {}).items():
@@ -399,7 +460,7 @@ def write_figures(
     Raises
     ------
     InputError
-        For a figure that the file does not have.
+        For a figure that the file does not have, or a file without angles and rates.
     StoreError
         Where the file cannot be read or the folder cannot be written.
     """

@@ -1,4 +1,4 @@
-"""Pages as files: their names, their HTML by a template (text is escaped), and their writing."""
+"""Write pages as files: choose their names, make their HTML by a template, and write them."""
 
 from __future__ import annotations
 
@@ -56,10 +56,18 @@ _UNPRINTABLE = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ud800-\udfff]")
 
 
 def page_names(scenes: Iterable[str]) -> dict[str, str]:
-    """Choose a file name for each scene: "paper-fig05.html" for "paper/fig05"; all different, also
-    where case is ignored.
+    """Choose a file name for each scene: "paper-fig05.html" for "paper/fig05".
 
-    Raises StoreError for a name with a part ".." or ".": no file of this program has one.
+    All names are different, also where case is ignored.
+
+    Parameters
+    ----------
+    scenes : names of scenes.
+
+    Raises
+    ------
+    StoreError
+        For a name with a part ".." or ".": no file of this program has one.
     """
     names: dict[str, str] = {}
     taken = {f"{name}.html" for name in MAIN_PAGES}
@@ -79,11 +87,20 @@ def page_names(scenes: Iterable[str]) -> dict[str, str]:
 
 
 def write_pages(folder: Path, pages: Mapping[str, str]) -> None:
-    """Write each page whole or not at all; then remove pages of an earlier report that are no
-    longer made.
+    """Write each page whole or not at all; then remove pages of an earlier report.
 
-    Raises StoreError where the folder cannot be written, InputError where it has other pages of
-    these names.
+    Parameters
+    ----------
+    folder : where they are written; it is made where it does not exist.
+    pages : HTML by file name. Pages in the folder that a report wrote and that are not among them
+        are removed.
+
+    Raises
+    ------
+    StoreError
+        Where the folder cannot be written.
+    InputError
+        Where it has a file of one of these names that no report wrote.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -106,12 +123,15 @@ def write_pages(folder: Path, pages: Mapping[str, str]) -> None:
 def render(page: PageContent, made: Pairs = (), links: Pairs = (), here: str = "") -> str:
     """Return the HTML of a page: text, numbers of its plots, and the scripts that it needs.
 
+    Where the plots have more than MAX_NUMBERS numbers, the page is rendered again with fewer
+    samples.
+
     Parameters
     ----------
     page : its content.
     made : what made the results, see `runs.versions.made_with`.
     links : (file, label) of the main pages.
-    here : the file of this one.
+    here : the file of this page.
     """
     shown = []
     if any(file != here for file, _ in links):
@@ -133,7 +153,16 @@ def write_page(
 ) -> Path:
     """Write one page as the index of a folder, and return its path.
 
-    attributes: of what it shows, with what made it. Raises StoreError where it cannot be written.
+    Parameters
+    ----------
+    folder : where it is written.
+    page : its content.
+    attributes : of the file that it shows, with what made that.
+
+    Raises
+    ------
+    StoreError
+        Where the page cannot be written.
     """
     write_pages(Path(folder), {INDEX: render(page, made_with(attributes))})
     return Path(folder) / INDEX
@@ -189,15 +218,17 @@ def _environment() -> jinja2.Environment:
 
 
 def _still(plot: Plot, number: int) -> Markup:
-    """Return a still picture of a plot; the number is that of no other picture of the page."""
+    """Return a still picture of a plot; `number` is different for each picture of the page."""
     from rotor_mbs.report.canvas import still  # late: matplotlib, which many pages do not need
 
     return still(plot, f"still-{number}-")
 
 
 def _breakable(text: str) -> Markup:
-    """Return a name that a browser may break after a slash or an underscore, or a sentence,
-    typeset."""
+    """Return a name that a browser may break after a slash or an underscore.
+
+    A text with spaces is a sentence, and is typeset instead.
+    """
     if " " in text:
         return escape(numbers.typeset(text))
     return Markup(re.sub("([/_])", r"\1<wbr>", str(escape(text))))

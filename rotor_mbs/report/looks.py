@@ -1,5 +1,4 @@
-"""How methods and coordinates are drawn, the same in every figure, and the colours of light and
-dark pages."""
+"""Define how methods and coordinates are drawn in every figure, and the palette of the pages."""
 
 from __future__ import annotations
 
@@ -77,10 +76,12 @@ _MARKERS = ("o", "s", "^", "D", "v", "P", "X", "h", "p", "<", ">")
 
 @dataclass(frozen=True)
 class Look:
-    """How a curve is drawn, in matplotlib's notation: colour ("#0072b2"), line ("-", "--", "-.",
-    ":") and marker.
+    """A colour, a line and a marker for a curve, in matplotlib's notation.
 
-    label: what it is called in a legend; "" where it stands in none.
+    colour : such as "#0072b2".
+    line : "-", "--", "-.", ":", or "" for none.
+    marker : "" for none.
+    label : name in a legend; "" for none.
     """
 
     colour: str
@@ -90,7 +91,7 @@ class Look:
 
     @property
     def css(self) -> str:
-        """The classes of the style sheet that draw it on a page: "blue dashed"."""
+        """Return the classes of the style sheet that draw the curve on a page: "blue dashed"."""
         name = _NAMES.get(self.colour, "grey")
         if name == "reference":
             return "reference"  # a wide band, on which other curves can be seen
@@ -129,8 +130,10 @@ def _catalogue_looks() -> dict[str, Look]:
 
 
 def look_of(curve: str) -> Look:
-    """Return how a method, or a curve of the bench, is drawn; one that is not in the catalogue in
-    grey."""
+    """Return how a method, or a curve of the bench, is drawn.
+
+    One that is not in the catalogue is grey; its line and marker follow from its name.
+    """
     look = _catalogue_looks().get(curve)
     if look is None:
         code = zlib.crc32(curve.encode("utf-8", "replace"))
@@ -147,21 +150,24 @@ def coordinate_look(index: int, label: str = "") -> Look:
 
 
 def step_look(place: int, count: int, label: str) -> Look:
-    """Return the look of the curve `place` of `count` values of a varied parameter, in ascending
-    order."""
+    """Return the look of one of the curves for the values of a varied parameter.
+
+    place : of the value, from 0, in ascending order; count : of the values.
+    """
     step = round(place * (STEPS - 1) / max(count - 1, 1)) if count > 1 else 0
     return Look(PALETTE[f"step-{step}"][0], ("-", "--", "-.", ":")[place // STEPS % 4], "", label)
 
 
 def name_of_colour(colour: str) -> str:
-    """Return the name in the style sheet of a colour of the light palette, "blade-1"; "" for
-    another colour."""
+    """Return the name of a colour of the light palette, such as "blade-1"; "" for another."""
     return _NAMES.get(colour, "")
 
 
 def palette_css() -> str:
-    """Return the palette as a style sheet: a variable for each colour, light and dark, and a class
-    that draws in it."""
+    """Return the palette as a style sheet.
+
+    It has a variable for each colour, for light and dark pages, and a class that draws in it.
+    """
     light, dark = (
         ";".join(f"--{name}:{pair[shade]}" for name, pair in PALETTE.items()) for shade in (0, 1)
     )

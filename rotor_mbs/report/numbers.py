@@ -1,4 +1,4 @@
-"""Numbers and formulas as text: few digits, powers of ten, SI prefixes, a true minus sign."""
+"""Write numbers and formulas as text: few digits, powers of ten, SI prefixes, a true minus sign."""
 
 from __future__ import annotations
 
@@ -32,7 +32,10 @@ def power(exponent: int) -> str:
 def number(value: float | None, digits: int = 2) -> str:
     """Return a number with so many significant digits: 0.31, 12, 1200, 1.2×10⁻¹⁰.
 
-    None gives a dash, NaN and infinities "not finite".
+    Parameters
+    ----------
+    value : None gives a dash, NaN and infinities "not finite".
+    digits : number of significant digits.
     """
     if value is None:
         return NOTHING
@@ -56,8 +59,10 @@ def typeset_title(title: str) -> str:
 
 
 def fixed(value: float | None, decimals: int) -> str:
-    """Return a number with so many decimals, as a paper prints it; a zero has no sign, None gives a
-    dash."""
+    """Return a number with a given count of decimals, as a paper prints it.
+
+    A zero has no sign; None gives a dash.
+    """
     if value is None:
         return NOTHING
     text = f"{value:.{decimals}f}"
@@ -70,8 +75,9 @@ def with_unit(value: float | None, unit: str, digits: int = 2) -> str:
 
 
 def prefix_of(largest: float) -> tuple[float, str]:
-    """Return the number by which a channel up to `largest` is divided, and the prefix of its unit:
-    k, M, G or none.
+    """Return the scale of a channel and the prefix of its unit: k, M, G or none.
+
+    Values are divided by the scale; `largest` is the largest size among them.
 
     >>> prefix_of(4.2e4)
     (1000.0, 'k')
@@ -83,8 +89,7 @@ def prefix_of(largest: float) -> tuple[float, str]:
 
 
 def prefixed(value: float | None, unit: str, digits: int = 3) -> str:
-    """Return a number with a prefix of its unit where it is large: "1.12 MJ", "687 J", "0.0041
-    J"."""
+    """Return a number with its unit, and a prefix of the unit where it is large: "1.12 MJ"."""
     if value is None or not math.isfinite(value) or value == 0.0:
         return with_unit(value, unit, digits)
     # 999.9 with three digits is 1.00 k.
@@ -108,10 +113,18 @@ def up_to(value: float | None, digits: int = 2) -> str:
 
 
 def span(low: float, high: float, digits: int = 3, unit: str = "") -> str:
-    """Return a range, both ends to the digits of the larger one, so that what is next to zero is
-    zero.
+    """Return a range, both ends to the digits of the larger one.
 
-    unit: directly behind both numbers, such as °.
+    A number that is small beside the larger end is thus written as zero.
+
+    Parameters
+    ----------
+    low, high : the ends.
+    digits : significant digits of the larger end.
+    unit : directly behind both numbers, such as °.
+
+    Examples
+    --------
 
     >>> span(-0.00189, 1.75), span(-11.46, 11.2, unit="°")
     ('0 to 1.75', '−11.5° to 11.2°')
@@ -125,8 +138,7 @@ def span(low: float, high: float, digits: int = 3, unit: str = "") -> str:
 
 
 def shortest(value: float) -> str:
-    """Return a number that somebody chose as briefly as it can be written: 0, 300, 10⁵, 3.2×10⁴,
-    9.81.
+    """Return a number that somebody chose, as briefly as possible: 0, 300, 10⁵, 3.2×10⁴, 9.81.
 
     >>> shortest(1e5), shortest(300.0), shortest(-3.2e4), shortest(1e-3)
     ('10⁵', '300', '−3.2×10⁴', '0.001')
@@ -159,8 +171,10 @@ def in_words(count: int) -> str:
 
 
 def typeset(text: str) -> str:
-    """Return a sentence in which 8.1e+00 is written 8.1 and 1e-06 10⁻⁶; names such as torque-1e9
-    stay."""
+    """Return a sentence with computed numbers typeset: 8.1 for 8.1e+00, 10⁻⁶ for 1e-06.
+
+    Names such as torque-1e9 stay, and text that is markup already.
+    """
 
     def shortest(computed: re.Match[str]) -> str:
         mantissa, exponent = computed.groups()
@@ -174,13 +188,14 @@ def typeset(text: str) -> str:
 
 
 def minus(text: str) -> str:
+    """Return the text with true minus signs in place of hyphens."""
     return text.replace("-", "−")
 
 
 def formula(text: str, *, in_prose: bool = False) -> Markup:
     """Return the text with symbols in italics and their indices as subscripts.
 
-    in_prose: single letters are words, but for those that are symbols of the paper.
+    in_prose : single letters are words, but for those that are symbols of the paper.
     """
     symbol = _SYMBOL_IN_PROSE if in_prose else _SYMBOL
 

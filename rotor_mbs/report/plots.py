@@ -1,5 +1,7 @@
-"""What several pages draw from plain arrays: motion, energies and errors over time, paths of the
-blade tips; and the same of runs that are in memory, for notebooks and scripts."""
+"""Plot motion, energies and errors over time, and paths of the blade tips, from plain arrays.
+
+The classes do the same for runs that are in memory, for notebooks and scripts.
+"""
 
 from __future__ import annotations
 
@@ -44,7 +46,14 @@ class Series(NamedTuple):
 def motion(
     time: Array, angles: Array | None, rates: Array | None, horizon: float | None = None
 ) -> Panels:
-    """Plot angles (rad) above rates (rad/s), both (n, coordinates); either may be None."""
+    """Plot angles above rates, each for the rotor and for the pitches.
+
+    Parameters
+    ----------
+    time : (n,) s.
+    angles, rates : (n, coordinates) rad and rad/s, rotor first; either may be None.
+    horizon : s, which is marked; None: it is not.
+    """
     rows: list[tuple[str, Sequence[Series]]] = []
     for name, values in ((ANGLE_AXIS, angles), (RATE_AXIS, rates)):
         if values is not None:
@@ -55,15 +64,19 @@ def motion(
 
 
 def coordinate_series(time: Array, values: Array) -> list[Series]:
-    """Return a curve for each coordinate of `values` (n, coordinates)."""
+    """Return a curve for each coordinate of `values` (n, coordinates), with its look."""
     return [Series(time, x, coordinate_look(i)) for i, x in enumerate(values.T)]
 
 
 def draw_lines(axes: Any, series: Sequence[Series], label: str) -> None:
     """Draw curves over one vertical axis.
 
-    label: with the unit in brackets; of other quantities than angles and rates it gets a prefix, k
-    or M, where the values are large.
+    Parameters
+    ----------
+    axes : of matplotlib.
+    series : the curves; at least one. Long ones are thinned.
+    label : with the unit in brackets. Of other quantities than angles and rates the unit gets a
+        prefix, k, M or G, where the values are large.
     """
     shortest = min(len(curve.values) for curve in series)
     values = np.stack([curve.values[:shortest] for curve in series], axis=1)
@@ -78,8 +91,13 @@ def draw_lines(axes: Any, series: Sequence[Series], label: str) -> None:
 
 
 def set_range(axes: Any, values: Array) -> None:
-    """Set the vertical range for `values` (n, curves), without a divergence and without magnifying
-    rounding errors."""
+    """Set the vertical range so that neither a divergence nor rounding errors fill it.
+
+    Parameters
+    ----------
+    axes : of matplotlib; left as they are where the values are ordinary.
+    values : (n, curves).
+    """
     if is_cut(values):
         usual = float(np.quantile(np.abs(values).max(axis=1), 0.9))
         axes.set_ylim(-2.0 * usual, 2.0 * usual)
@@ -100,7 +118,7 @@ def lines(
     Parameters
     ----------
     rows : of each panel the label, with a unit, and its curves.
-    horizon : s, which is marked.
+    horizon : s, which is marked; None: it is not.
     heights : of the panels, in; equal ones where left out.
     """
     panels = canvas.panels(tuple(heights) or (2.3,) * len(rows), TIME_AXIS)
@@ -111,7 +129,15 @@ def lines(
 
 
 def component_panels(quantity: Quantity, plot: Plot, time: Array, values: Array) -> Panels:
-    """Return a panel per axis with a line per blade, or one panel with a line per axis or blade."""
+    """Return a panel per axis with a line per blade, or one panel with a line per axis or blade.
+
+    Parameters
+    ----------
+    quantity : tells whether the second dimension is blades.
+    plot : gives the label of the vertical axis.
+    time : (n,) s.
+    values : (n, blades, 3), (n, blades) or (n, 3), in the quantity's unit.
+    """
     first = 1 if quantity.dimensions[1] == "blade" else 0  # a blade has the look of its pitch
     names = "xyz" if first == 0 else [f"blade {i + 1}" for i in range(values.shape[1])]
     panels = "xyz" if values.ndim == 3 else [""]
@@ -125,7 +151,14 @@ def component_panels(quantity: Quantity, plot: Plot, time: Array, values: Array)
 
 
 def errors(series: Sequence[Series], label: str, horizon: float | None = None) -> Panels:
-    """Draw magnitudes on a logarithmic axis from 1 or less."""
+    """Plot magnitudes over time on a logarithmic axis that begins at 1 or less.
+
+    Parameters
+    ----------
+    series : the curves. Values up to LOWEST are gaps, those beyond HIGHEST are drawn there.
+    label : of the vertical axis.
+    horizon : s, which is marked; None: it is not.
+    """
     panels = canvas.panels((2.9,), TIME_AXIS)
     axes, known = panels.axes[0], []
     for curve in series:
@@ -151,22 +184,30 @@ def errors(series: Sequence[Series], label: str, horizon: float | None = None) -
 
 
 def thin(time: Array, values: Array) -> tuple[Array, Array]:
-    """Return the ends, and the smallest and the largest sample of equal intervals: no peak is
-    lost."""
+    """Return the ends, and the smallest and the largest sample of equal intervals.
+
+    So no peak is lost. time and values are (n,).
+    """
     index = canvas.extremes(values, _MAX_POINTS)
     return time[index], values[index]
 
 
 def is_cut(values: Array) -> bool:
-    """Return whether the largest of these values (n, curves) are a divergence, and not a jolt that
-    passes."""
+    """Return whether the largest of these values (n, curves) are a divergence.
+
+    They are, where they exceed the usual values by far and have not come down again at the end: a
+    jolt that passes is not a divergence.
+    """
     largest = np.abs(values).max(axis=1)
     usual = float(np.quantile(largest, 0.9))
     return bool(min(largest.max(), _STILL * largest[-5:].max()) > _RUNAWAY * usual > 0.0)
 
 
 def mark_time(axes: Any, end: float, horizon: float | None) -> None:
-    """Draw a vertical line at the horizon, where that lies before the end (s) of what is drawn."""
+    """Draw a vertical line at the horizon, where that lies before the end of what is drawn.
+
+    end, horizon : s; without a horizon there is no line.
+    """
     if horizon is not None and horizon < end:
         axes.axvline(
             horizon,
@@ -178,7 +219,13 @@ def mark_time(axes: Any, end: float, horizon: float | None) -> None:
 
 
 def paths(tip: Array, tilt: float = 0.0) -> Panels:
-    """Plot the paths of `tip` (n, blades, 3) m; tilt: of the shaft, rad."""
+    """Plot the paths of the blade tips.
+
+    Parameters
+    ----------
+    tip : (n, blades, 3) m, base frame.
+    tilt : of the shaft, rad.
+    """
     panels = canvas.panels((4.1,), "")
     draw_paths(panels.axes[0], tip, tilt)
     return panels
@@ -189,7 +236,7 @@ def draw_paths(axes: Any, tip: Array, tilt: float = 0.0) -> None:
 
     Parameters
     ----------
-    axes : of Matplotlib.
+    axes : of matplotlib.
     tip : (n, blades, 3) m, base frame.
     tilt : of the shaft, rad.
     """
@@ -241,8 +288,17 @@ def draw_paths(axes: Any, tip: Array, tilt: float = 0.0) -> None:
 
 
 def projected(points: Array) -> Array:
-    """Project points (n, 3) to what is seen from far away, above and to the side: (n, 2), to the
-    right and up, m."""
+    """Project points to the plane of a picture, as seen from far away, above and to the side.
+
+    Parameters
+    ----------
+    points : (n, 3) m, base frame.
+
+    Returns
+    -------
+    (n, 2) ndarray
+        To the right and up, m.
+    """
     right = np.array([-np.sin(_AZIMUTH), np.cos(_AZIMUTH), 0.0])
     level = np.array([np.cos(_AZIMUTH), np.sin(_AZIMUTH), 0.0])
     up = np.array([0.0, 0.0, np.cos(_ELEVATION)]) - np.sin(_ELEVATION) * level
@@ -251,18 +307,23 @@ def projected(points: Array) -> Array:
 
 
 class ComparisonPlots:
-    """Plots of several runs of one scene."""
+    """Plots of several runs of one scene; each method returns a figure."""
 
     def __init__(self, runs: Mapping[str, Solution], reference: Trajectory | None) -> None:
         self._runs, self._reference = list(runs.values()), reference
 
     def __call__(self) -> Panels:
-        """Same as `error`."""
+        """Plot the largest angle error of each run, same as `error`."""
         return self.error()
 
     def error(self) -> Panels:
-        """Plot the largest angle error (rad) of each run over time. Raises InputError without
-        angles or reference."""
+        """Plot the largest angle error (rad) of each run over time.
+
+        Raises
+        ------
+        InputError
+            Without a reference, or for a run without angles.
+        """
         if self._reference is None:
             raise InputError(
                 "no reference to compare with; allowed: run(..., reference=True) computes one"
@@ -273,10 +334,12 @@ class ComparisonPlots:
         return errors(series, "largest angle error (rad)", horizon(self._reference)).with_legend()
 
     def defects(self) -> Panels:
-        """Plot the interval defects (rad) of each run over time. Raises InputError for fewer than
-        two samples.
+        """Plot the interval defects (rad) of each run over time.
 
         Those of a run of a sweep, which are not stored, are computed.
+
+        Raises ------ InputError For a run with fewer than two samples, or without angles and rates
+        where defects are not stored.
         """
         series = []
         for run in self._runs:
@@ -295,13 +358,24 @@ class ComparisonPlots:
         return errors(series, "defect (rad)").with_legend()
 
     def rotor(self) -> Panels:
-        """Plot the rotor angle (rad) of each run over time."""
+        """Plot the rotor angle (rad) of each run over time.
+
+        Raises
+        ------
+        InputError
+            For a run without angles.
+        """
         series = self._series([_quantity(run, "angles")[:, 0] for run in self._runs])
         return lines([("rotor angle (rad)", series)]).with_legend()
 
     def energy_error(self) -> Panels:
-        """Plot the energy error relative to the energy scale over time. Raises InputError for runs
-        without energies."""
+        """Plot the energy error relative to the energy scale over time.
+
+        Raises
+        ------
+        InputError
+            For a run without energies.
+        """
         shares = []
         for run in self._runs:
             scale = energy_scale(run.scene, run.trajectory)
@@ -317,15 +391,20 @@ class ComparisonPlots:
 
 
 class RunPlots(ComparisonPlots):
-    """Plots of a run."""
+    """Plots of one run; each method returns a figure."""
 
     def __init__(self, run: Solution, reference: Trajectory | None) -> None:
         super().__init__({run.method: run}, reference)
         self._run = run
 
     def __call__(self) -> Panels:
-        """Plot angles (rad) and rates (rad/s) of rotor and pitches over time (s). Raises InputError
-        without both."""
+        """Plot angles (rad) and rates (rad/s) of rotor and pitches over time (s).
+
+        Raises
+        ------
+        InputError
+            For a run without samples, or with neither angles nor rates.
+        """
         run = self._run
         horizon_s = None if self._reference is None else horizon(self._reference)
         angles, rates = (
@@ -335,8 +414,13 @@ class RunPlots(ComparisonPlots):
         return motion(_some(run.time), shown, rates, horizon_s).with_legend()
 
     def energy(self) -> Panels:
-        """Plot kinetic and potential energy, and their sum minus the work (J). Raises InputError
-        without energies."""
+        """Plot kinetic and potential energy, and their sum minus the work (J).
+
+        Raises
+        ------
+        InputError
+            For a run without energies.
+        """
         run = self._run
         kinetic, potential, work = (
             _quantity(run, name) for name in ("kinetic_energy", "potential_energy", "work")
@@ -349,13 +433,19 @@ class RunPlots(ComparisonPlots):
         return lines([("energy (J)", [Series(run.time, *curve) for curve in curves])]).with_legend()
 
     def loads(self, name: str = "blade_root_force") -> Panels:
-        """Plot a load over time: a panel per axis with a line per blade, or one panel with a line
-        per axis (or blade).
+        """Plot a load over time.
 
-        name: blade_root_force, blade_root_moment, shaft_force, shaft_moment or
-        pitch_actuator_moment (N, N m).
+        There is a panel per axis with a line per blade, or one panel with a line per axis or blade.
 
-        Raises InputError if the run does not have it.
+        Parameters
+        ----------
+        name : blade_root_force, blade_root_moment, shaft_force, shaft_moment or
+            pitch_actuator_moment (N, N m).
+
+        Raises
+        ------
+        InputError
+            For another name, or a run that does not have the load.
         """
         plotted = {load.name: load for load in LOADS if load.plot is not None}
         load = plotted.get(name)
@@ -365,7 +455,13 @@ class RunPlots(ComparisonPlots):
         return component_panels(load, load.plot, self._run.time, values).with_legend()
 
     def tips(self) -> Panels:
-        """Plot the paths of the blade tips (m). Raises InputError if the run does not have them."""
+        """Plot the paths of the blade tips (m).
+
+        Raises
+        ------
+        InputError
+            If the run does not have them.
+        """
         _some(self._run.time)
         return paths(_quantity(self._run, "tip"), self._run.scene.shaft_tilt).with_legend()
 
@@ -377,8 +473,13 @@ def _some(time: Array) -> Array:
 
 
 def _quantity(run: Solution, name: str) -> Array:
-    """Return a quantity of a run. Raises InputError where the run does not have it, or its file
-    does not."""
+    """Return a quantity of a run by its name.
+
+    Raises
+    ------
+    InputError
+        Where the run has no samples or no such quantity, or its file does not store it.
+    """
     _some(run.time)
     try:
         values = run[name]

@@ -201,6 +201,10 @@ def _hero_scene(report: Report) -> StoredScene | None:
 
     It is the one with a published number that is not amplified rounding error, else the first with
     angles of both models.
+
+    Parameters
+    ----------
+    report : the open results file.
     """
     both = [
         scene
