@@ -104,6 +104,7 @@ def frames(stored: StoredScene, magnified: float | None) -> Iterator[Image.Image
         raise InputError(f"{stored.name}: nothing to plot: no angles")
     end = min(max(float(run.array("time")[-1]) for run in runs.values()), scene.duration)
     count = max(2, min(round(end * RATE) + 1, _MAX_FRAMES))
+    # Times of the points of the paths: so many for each frame that paths are smooth.
     at = np.linspace(0.0, end, (count - 1) * _PATH_POINTS + 1)
     needed = magnification(scene)
     factor = 1.0 if needed is None else float(magnified or needed)
@@ -161,6 +162,7 @@ def wires(scene: Scene, time: Array, angles: Array, at: Array, magnified: float)
         tip.
     """
     moved = np.stack([np.interp(at, time, column) for column in angles.T], axis=1)
+    # Each corner as the tip of blades that have their tip there.
     corners = []
     for across, along in ((0.0, 1.0), (magnified, 1.0), (magnified, 0.06)):
         blades = []

@@ -48,17 +48,22 @@ class Page(NamedTuple):
 def write_report(
     results: Path, output: Path, jobs: Workers = 1, on_page: OnPage = lambda *_: None
 ) -> Path:
-    """Write the pages about a file into a folder, all or none, and return the path of the index.
+    """Write the pages about a file into a folder, and return the path of the index.
+
+    All pages are made before the first one is written.
 
     Parameters
     ----------
     results : any file that this program writes.
     output : the folder, which is made where it does not exist.
     jobs : number of processes, or an open pool.
-    on_page : called with the number of pages that are made, and of all.
+    on_page : called with the number of pages that are made, and of all; not for a sweep, which has
+        one page.
 
     Raises
     ------
+    InputError
+        Where the folder has a file of a page's name that no report wrote.
     StoreError
         Where the file cannot be read or has nothing to report, or the folder cannot be written.
     """

@@ -350,6 +350,7 @@ def extremes(values: Any, most: int) -> NDArray[np.int64]:
     if count <= most:
         return np.arange(count)
     chosen = [0, count - 1]
+    # Two samples of each interval; NaN is replaced by what is never the smallest or the largest.
     for interval in np.array_split(np.arange(count), most // 2):
         known = np.isfinite(values[interval])
         low, high = (np.where(known, values[interval], replaced) for replaced in (np.inf, -np.inf))

@@ -56,7 +56,9 @@ class CurveStore:
             origin = float(known[0])
         with np.errstate(invalid="ignore"):
             column = np.clip(table - origin, -_LARGEST, _LARGEST).astype("<f4").ravel()
+        # The limits make infinities finite; they are gaps, as NaN is.
         column[~np.isfinite(table.ravel())] = np.nan
+        # Columns of equal numbers, such as the times of several plots, are stored once.
         digest = hashlib.sha256(column.tobytes()).digest()
         if digest not in self._places:
             self._places[digest] = self.size

@@ -98,7 +98,8 @@ def all_figures(scenes: Mapping[str, StoredScene]) -> dict[str, PaperFigure]:
 def compared_runs(scene: StoredScene) -> dict[str, StoredRun]:
     """Return the scene's runs with angles and rates by "printed", "corrected", and "independent".
 
-    The independent run is the first one by another model than the corrected run's.
+    The independent run is the first corrected one with samples that is neither of the Lagrange
+    model nor the reference.
 
     Parameters
     ----------
@@ -259,6 +260,7 @@ def composed(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> canvas.P
             headings.append(DIFFERENCE)
         for axes, text in zip(table[0], headings, strict=True):
             axes.text(0.5, heading, text, transform=axes.transAxes, ha="center", weight="bold")
+        # A model that a panel has no run of leaves its axes empty.
         for axes in panels.axes:
             if not axes.has_data():
                 axes.set_axis_off()

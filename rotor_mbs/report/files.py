@@ -76,6 +76,7 @@ def page_names(scenes: Iterable[str]) -> dict[str, str]:
             raise StoreError(
                 f"scene name {scene!r} cannot be made a file name; allowed: no part .. or ."
             )
+        # Characters that every file system and every address allows.
         stem = re.sub(r"[^A-Za-z0-9._-]+", "-", scene)[:_LONGEST].strip(".-") or "scene"
         stem = f"scene-{stem}" if stem.lower().startswith(_OTHERS) else stem
         name, number = f"{stem}.html", 2
@@ -136,6 +137,7 @@ def render(page: PageContent, made: Pairs = (), links: Pairs = (), here: str = "
     shown = []
     if any(file != here for file, _ in links):
         shown = [(file, label, file == here) for file, label in links]
+    # Rendering fills the store: how many numbers a page has is known only then.
     template, store = _environment().get_template("page.html.j2"), CurveStore()
     known = {"page": page, "links": shown, "versions": made}
     html = template.render(known, store=store, numbered=itertools.count(1).__next__)

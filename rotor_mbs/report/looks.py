@@ -123,6 +123,7 @@ def _catalogue_looks() -> dict[str, Look]:
         place, turn = models.setdefault(model, len(models)), counts[model]
         colours = _MODEL_COLOURS[place] if place < len(_MODEL_COLOURS) else ("grey",)
         marker = _MARKERS[(turn + 3 * place) % len(_MARKERS)]
+        # A model's colours in turn with one line, then with the next one.
         line = list(_DASHES)[turn // len(colours) % len(_DASHES)]
         looks[curve] = Look(PALETTE[colours[turn % len(colours)]][0], line, marker)
         counts[model] += 1
@@ -136,6 +137,7 @@ def look_of(curve: str) -> Look:
     """
     look = _catalogue_looks().get(curve)
     if look is None:
+        # Not by hash(), which differs from process to process.
         code = zlib.crc32(curve.encode("utf-8", "replace"))
         look = Look(GREY, list(_DASHES)[code % 4], _MARKERS[code // 4 % len(_MARKERS)])
     return replace(look, label=label_of(curve))

@@ -43,6 +43,7 @@ def number(value: float | None, digits: int = 2) -> str:
         return "not finite"
     if value == 0.0:
         return "0"
+    # The exponent of the rounded number: 9.99 with two digits is 10.
     mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
     if -3 <= int(exponent) < 4:
         return minus(f"{value:.{max(digits - 1 - int(exponent), 0)}f}")
@@ -125,7 +126,6 @@ def span(low: float, high: float, digits: int = 3, unit: str = "") -> str:
 
     Examples
     --------
-
     >>> span(-0.00189, 1.75), span(-11.46, 11.2, unit="°")
     ('0 to 1.75', '−11.5° to 11.2°')
     """

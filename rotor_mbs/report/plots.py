@@ -200,6 +200,8 @@ def is_cut(values: Array) -> bool:
     """
     largest = np.abs(values).max(axis=1)
     usual = float(np.quantile(largest, 0.9))
+    # The largest value counts by at most _STILL times what the last samples have, so that a peak
+    # after which the motion is small again does not count.
     return bool(min(largest.max(), _STILL * largest[-5:].max()) > _RUNAWAY * usual > 0.0)
 
 
@@ -258,6 +260,7 @@ def draw_paths(axes: Any, tip: Array, tilt: float = 0.0) -> None:
         linewidth=3.0,
     )
     ten = 10.0 ** math.floor(math.log10(reach))
+    # The scale: the longest of 1, 2 or 5 times a power of ten within a third of the reach.
     length = next(step * ten for step in (5.0, 2.0, 1.0, 0.5, 0.2) if reach >= 3.0 * step * ten)
     corner = np.array([-0.88, -0.86]) * reach
     for end, name in zip(projected(length * np.eye(3)), "xyz", strict=True):
@@ -279,6 +282,7 @@ def draw_paths(axes: Any, tip: Array, tilt: float = 0.0) -> None:
         for end, dashes, fill in ((path[0], (0, (3, 2)), "white"), (path[-1], "-", colour)):
             axes.plot((0.0, end[0]), (0.0, end[1]), color=colour, linestyle=dashes, linewidth=1.6)
             axes.plot(*end[:, None], color=colour, marker="o", markersize=4, markerfacecolor=fill)
+    # Lines without points, for the legend alone.
     for dashes, width, label in (
         ("--", 1.6, "blade at the start"),
         ("-", 1.6, "at the end"),

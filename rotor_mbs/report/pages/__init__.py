@@ -92,6 +92,7 @@ class Report(OpenResults):
 
     @cached_property
     def suite_runs(self) -> Sequence[SuiteRun]:
+        """Return the runs of the stability suite; none where the file is not of it."""
         return suite_runs(self.path) if self.is_suite else ()
 
 
@@ -132,6 +133,7 @@ def status_text(run: StoredRun) -> str:
 
 
 def words_of(status: str) -> str:
+    """Return a status in words: "timed out" for "timed_out"."""
     return status.replace("_", " ")
 
 

@@ -250,6 +250,7 @@ def _channel_section(record: Record, verdict: DataVerdict, marks: Sequence[Mark]
         curves.append(Curve("data", Look(INK, "-", "", "data"), rows, data))
         clip = None
         if len(curves) == 2:
+            # Data that run away are cut off, so that the reference can be seen.
             clip = draw.range_of(curves[0].y, data)
         state = " · outside the tolerance" if _is_outside(channel, verdict) else ""
         plots.append(

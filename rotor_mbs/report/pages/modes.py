@@ -82,6 +82,7 @@ class ModePlots:
         for k, known in enumerate(frequencies.T):
             first = known[np.flatnonzero(np.isfinite(known))[:1]]
             change = np.where(np.nanmax(known) > 1e-6 * top, known - first, np.nan)
+            # Markers of each mode begin at another sample: equal curves lie on each other.
             every = (k, frequencies.shape[1] * max(1, len(speeds) // 24))
             for axes, values in zip(panel.axes, (known, change), strict=True):
                 curve(
@@ -377,6 +378,7 @@ def _campbell(
     for k in multiples:
         line = np.where(k * speeds <= top, k * speeds, np.nan)
         harmonics.append(Curve(f"{name} harmonics", Look(GREY, ":", "", f"{k}P"), speeds, line))
+    # The frequency at the lowest speed at which a mode has one; the sum of none is 0.
     first = np.array(
         [column[np.flatnonzero(np.isfinite(column))[:1]].sum() for column in frequencies.T]
     )

@@ -63,6 +63,7 @@ def quantity_of(claim: Published) -> str:
 
 
 def unit_of_claim(claim: Published) -> str:
+    """Return the unit of a published number."""
     return COLUMNS[claim.metric].units
 
 
@@ -141,6 +142,7 @@ def count_table(study: ClaimStudy) -> PageTable:
 
 
 def study_note(study: ClaimStudy) -> str:
+    """Return a text about the runs on which the verdicts are based, with the rule for them."""
     durations = ", ".join(f"{duration:g}" for duration in study.durations)
     return (
         f"Based on {study.runs} runs of each scene for each of the durations {durations} s, with "

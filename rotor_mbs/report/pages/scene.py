@@ -351,6 +351,7 @@ def paper_plots(
             still=is_main,
         )
     moving = viewer(scene, {"as printed": printed, "corrected": corrected})
+    # A single plot where there are no pitches.
     stack = [plots[k] for k in dict.fromkeys([0, shown])]
     cards: list[list[Element]] = [] if moving is None else [[Viewer(moving, scene.title)]]
     hero = Grid(len(cards) + 1, [*cards, [*stack]])

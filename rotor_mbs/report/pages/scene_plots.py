@@ -206,6 +206,7 @@ def differing_coordinate(printed: StoredRun, corrected: StoredRun, first: int = 
     """
     angles = printed.array("angles"), corrected.array("angles")
     n = min(map(len, angles))
+    # By the difference; where that is nothing, by the motion of the corrected model.
     for values in (angles[0][:n] - angles[1][:n], angles[1]):
         sizes = np.abs(values[:, first:]).max(axis=0, initial=0.0)
         if sizes.size and sizes.max() > LEAST_ANGLE:

@@ -57,6 +57,7 @@ def stability_page(report: Report) -> PageContent:
                 whole,
             )
         )
+        # By the share: not every method has run every scene.
         worst = min(methods, key=lambda method: good[method] / max(counts[method], 1))
         if good[worst] < best:
             text = Markup("The fewest: {}, {} of {}.")

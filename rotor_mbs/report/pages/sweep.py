@@ -65,6 +65,7 @@ class RunQuantity:
 
     @property
     def title(self) -> str:
+        """Return the name with the unit in brackets, where it has one."""
         return f"{self.name} ({self.unit})" if self.unit else self.name
 
 
@@ -82,19 +83,23 @@ class _Sweep:
         self.codes = np.asarray(stored.column("method_code"))
 
     def unit(self, key: str) -> str:
+        """Return the unit of a parameter; "" for a number without unit."""
         unit = self.stored.columns[parameter_name(key)].units.replace("^2", "²")
         return "" if unit == "1" else unit
 
     def axis_name(self, key: str) -> str:
+        """Return a parameter in words with its unit."""
         unit = self.unit(key)
         return f"{field_name(key)} ({unit})" if unit else field_name(key)
 
     def status_of(self, run: int) -> str:
+        """Return the status of a run in words; "missing" for one that was not computed."""
         code = int(self.statuses[run])
         return words_of(STATUSES[code]) if code >= 0 else "missing"
 
     @cached_property
     def is_good(self) -> NDArray[np.bool_]:
+        """Return which runs need no attention: (runs,)."""
         return np.isin(
             self.statuses, [code for code, status in enumerate(STATUSES) if status in GOOD]
         )
@@ -114,12 +119,12 @@ class _Sweep:
 
     @cached_property
     def varied(self) -> list[str]:
-        """The parameters with more than one value."""
+        """Return the parameters with more than one value."""
         return [key for key in self.keys if len(np.unique(self.parameters[key])) > 1]
 
     @cached_property
     def grid_keys(self) -> list[str]:
-        """The parameters of a grid, slowest first; none where the runs are no grid."""
+        """Return the parameters of a grid, slowest first; none where the runs are no grid."""
         return self.varied if len(self.stored.shape) == len(self.keys) else []
 
     def described(self, run: int) -> str:
@@ -293,6 +298,7 @@ def run_quantities(sweep: _Sweep) -> list[RunQuantity]:
 def _over(statistic: object, values: Array, axis: int) -> Array:
     """Return a statistic along an axis, NaN where no number is finite, without a warning."""
     assert callable(statistic)
+    # NumPy warns of slices without a number: they are filled before, and are NaN after.
     known = np.isfinite(values).any(axis=axis)
     filled = np.where(np.expand_dims(known, axis), values, 0.0)
     return np.where(known, statistic(filled, axis=axis), np.nan)
@@ -308,6 +314,8 @@ def explained(values: Array, parameter: Array) -> float:
     whole = float(((y - y.mean()) ** 2).sum())
     if not whole:
         return 0.0
+    # Analysis of variance: the sum of squares between the groups of equal values of the parameter,
+    # relative to the whole sum.
     between = 0.0
     for value in np.unique(parameter[known]):
         group = y[parameter[known] == value]
@@ -533,6 +541,7 @@ def _curves(sweep: _Sweep, shown: NDArray[np.bool_]) -> tuple[list[Plot], NDArra
     if not wanted or len(time) < 2:
         return [], places
     columns = sum(len(curves) for _, _, curves in wanted)
+    # Only every so many-th sample is taken, so that the curves of four runs fit on the page.
     every = max(1, math.ceil(len(time) * columns / (MAX_NUMBERS // 4)))
     samples = time[::every]
     runs = chosen_runs(sweep, shown, max(4, MAX_NUMBERS // (columns * len(samples))))
@@ -593,6 +602,7 @@ def chosen_runs(sweep: _Sweep, shown: NDArray[np.bool_], most: int) -> NDArray[n
     for key in sweep.varied:
         values = sweep.parameters[key]
         is_corner &= (values == values.min()) | (values == values.max())
+    # Corners before failed runs: what is beyond half of the room is cut off.
     first = [*np.flatnonzero(shown & is_corner), *runs[~sweep.is_good[runs]]]
     first = list(dict.fromkeys(int(run) for run in first if sweep.statuses[run] >= 0))[: most // 2]
     others = runs[np.linspace(0, len(runs) - 1, most - len(first)).astype(int)]

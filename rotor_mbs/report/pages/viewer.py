@@ -44,6 +44,7 @@ def viewer(stored: StoredScene, runs: Mapping[str, StoredRun]) -> dict[str, Any]
         if time is None or angles is None or angles.shape != (len(time), 1 + len(scene.blades)):
             continue
         good = np.isfinite(time) & np.isfinite(angles).all(axis=1)
+        # Samples up to the first one that is not finite.
         count = len(good) if good.all() else int(good.argmin())
         if count >= 2:
             moves[name] = time[:count], angles[:count]
@@ -100,6 +101,8 @@ def angles_at(time: Array, angles: Array, step: float) -> Array:
     (frames, coordinates) ndarray
         Angles, rad.
     """
+    # The quotient may lie below a whole number by its rounding alone; the last time is then limited
+    # to that of the last sample.
     count = math.floor(float(time[-1]) / step + 1e-9) + 1
     at = np.minimum(np.arange(count) * step, time[-1])
     return np.stack([np.interp(at, time, column) for column in angles.T], axis=1)
