@@ -25,7 +25,7 @@ SUFFIXES = (".webp", ".gif")
 RATE = 20  # frames a second, in real time
 _MARK = b"rotor_mbs animation"  # in the metadata of every file
 _MAX_FRAMES = 600  # a longer scene is shown faster
-_PATH_POINTS = 4  # along a path, from one frame to the next
+_PATH_POINTS = 4  # points of a path per frame
 
 
 def write_animation(results: Path, name: str, output: Path, magnified: float | None = None) -> Path:
@@ -52,7 +52,7 @@ def write_animation(results: Path, name: str, output: Path, magnified: float | N
             f"{output}: unknown format {kind or '(none)'}; allowed: {', '.join(SUFFIXES)}"
         )
     refuse_foreign(output, _MARK)  # before anything is drawn
-    # a scene of one's own is stored by the stem of its file
+    # A user's scene is stored by the stem of its file.
     name = Path(name).stem if name.endswith(".toml") else name
     with open_results(results) as opened:
         if name not in opened.scenes:
@@ -120,7 +120,7 @@ def frames(stored: StoredScene, magnified: float | None) -> Iterator[Image.Image
             colour = coordinate_look(blade + 1).colour
             paths += axes.plot([], [], color=colour, linewidth=0.8)
             blades += axes.fill([0.0], [0.0], facecolor="#dddddd", edgecolor=colour, linewidth=2.2)
-        # after the last sample it stands still
+        # After its last sample a run stands still.
         ended = int(np.searchsorted(at, run.array("time")[-1], side="right"))
         moving.append((axes, name, corners, ended, paths, blades))
     offset = f", offset drawn ×{factor:g}" if factor != 1.0 else ""
@@ -146,7 +146,7 @@ def frames(stored: StoredScene, magnified: float | None) -> Iterator[Image.Image
 
 
 def wires(scene: Scene, time: Array, angles: Array, at: Array, magnified: float) -> Array:
-    """Return where three corners of each blade are in the picture.
+    """Return the places in the picture of three corners of each blade.
 
     Parameters
     ----------
@@ -157,9 +157,9 @@ def wires(scene: Scene, time: Array, angles: Array, at: Array, magnified: float)
 
     Returns
     -------
-    (times, blades, 3, 2) m
+    (times, blades, 3, 2) ndarray
         The end of the pitch axis, the tip, and a point at the hub as far from the pitch axis as the
-        tip.
+        tip, m.
     """
     moved = np.stack([np.interp(at, time, column) for column in angles.T], axis=1)
     # Each corner as the tip of blades that have their tip there.

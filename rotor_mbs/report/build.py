@@ -28,10 +28,12 @@ from rotor_mbs.runs.read import is_sweep, open_results, read_records
 from rotor_mbs.runs.sweeps import StoredSweep
 from rotor_mbs.runs.versions import made_with
 
-_GROUPS = 2  # of pages per worker: each opens the file anew, and none waits long for the last one
+# Groups of pages per worker: each group opens the file anew; with more than one, workers that are
+# done early take another group.
+_GROUPS = 2
 _TIMEOUT_S = 600.0
 
-OnPage = Callable[[int, int], None]  # with how many are drawn, of how many
+OnPage = Callable[[int, int], None]  # called with the number of pages made, and of all
 
 
 class Page(NamedTuple):
@@ -70,7 +72,7 @@ def write_report(
     if is_sweep(results):
         from rotor_mbs.report.pages.sweep import (
             sweep_page,
-        )  # late: workers load what most files need
+        )  # late: most files need no such page
 
         sweep = StoredSweep(results)
         with reading(results), _without_warnings():
@@ -175,7 +177,7 @@ def pages_of(report: Report) -> list[Page]:
     if bench:
         pages.append(Page("bench.html", "Error and run time", partial(bench_page, report)))
     if modes:
-        from rotor_mbs.analysis.modes import read_modes  # late: workers load what most files need
+        from rotor_mbs.analysis.modes import read_modes  # late: most files have no modes
         from rotor_mbs.report.pages.modes import modes_page
 
         pages.append(

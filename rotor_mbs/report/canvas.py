@@ -54,7 +54,7 @@ with _unaffected_by_environment():
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
     from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
-if _is_imported_here and os.environ.get("MPLBACKEND"):  # for what else is drawn in this process
+if _is_imported_here and os.environ.get("MPLBACKEND"):  # for other drawings of this process
     with suppress(ValueError):
         matplotlib.rcParams["backend"] = os.environ["MPLBACKEND"]
 
@@ -90,7 +90,7 @@ class Panels:
         return artists
 
     def with_legend(self) -> Panels:
-        """Add a legend above the axes, and return the same object."""
+        """Add a legend of all labels above the axes, and return the same object."""
         artists = self.labelled()
         with style():
             self.axes[0].legend(
@@ -220,13 +220,13 @@ def encoded(
     with (
         style(for_print=for_print),
         np.errstate(over="ignore", invalid="ignore"),
-    ):  # numbers of a runaway
+    ):  # a divergence has numbers that overflow
         stream = io.BytesIO()
         figure.savefig(stream, format=kind, metadata=metadata)
     return stream.getvalue()
 
 
-# What an SVG file has and a part of a page does not need: metadata, comments, names of groups,
+# Parts of an SVG file that a page does not need: metadata, comments, names of groups,
 # spaces between elements.
 _SUPERFLUOUS = re.compile(
     r"<metadata>.*?</metadata>|<defs>\s*<style.*?</style>\s*</defs>|<!--.*?-->|(?<=>)\s+(?=<)"
@@ -234,11 +234,11 @@ _SUPERFLUOUS = re.compile(
     r'[^;"]*(; )?',
     re.DOTALL,
 )
-# of a marker or an area that is referred to
+# The name of a marker or a clip area, where it is defined or referred to.
 _NAME = re.compile(r'(id="|="#|\(#)(?=[a-zA-Z]+[0-9a-f]{10})')
 _COLOUR = re.compile(r"#[0-9a-f]{6}\b")
 _STILL_WIDTH = 3.4  # in, of 100 px: 12 px are 12 px on a telephone's page
-_STILL_POINTS = 300  # of a curve: about one a pixel
+_STILL_POINTS = 300  # largest number of points of a curve: about one per pixel
 
 
 def still(plot: Plot, name: str) -> Markup:

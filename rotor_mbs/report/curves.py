@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-# Where values are so many times their range, as a rotor angle after an hour, single precision would
-# show steps: what is stored is the difference from the first value.
+# Where values exceed their range by this factor, as a rotor angle after an hour does, single
+# precision would show steps: the difference from the first value is stored.
 _FAR_FROM_ZERO = 1000.0
-_LONG = 2000  # samples, two a pixel of a page
-# Single precision has no larger number.
+_LONG = 2000  # samples; a longer column may be thinned. About two per pixel of a page
+# About the largest number of single precision.
 _LARGEST = 3.0e38
 
 

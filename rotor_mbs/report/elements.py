@@ -121,10 +121,11 @@ class Curve:
     """A curve of a plot.
 
     key : by which a legend switches it, the same in all plots of a section.
-    look : its colour and line; the label is its name.
-    x : (n,) ascending; y : (n,), or (runs, n) of which one row is shown.
+    look : colour and line; its label is the name of the curve.
+    x : (n,) ascending.
+    y : (n,), or (runs, n) of which one row is shown.
     breaks : samples before which the line is interrupted: the first one after a jump.
-    dots : whether its points are marked; "only": no line joins them.
+    dots : "" for a line alone; any other text marks the points; "only": no line joins them.
     """
 
     key: str
@@ -234,7 +235,7 @@ class Note:
 
 @dataclass(frozen=True)
 class Viewer:
-    """The rotor moving: what `pages.viewer` makes for the script, and the title of the scene."""
+    """The moving rotor: what `pages.viewer` makes for the script, and the title of the scene."""
 
     data: Mapping[str, Any]
     title: str
@@ -340,7 +341,9 @@ class Fold:
 class Section:
     """A part of a page. One without elements is left out.
 
-    say : a line below the heading. A legend switches the curves of its own section.
+    id : name in addresses.
+    heading, say : the heading, and a line below it.
+    elements : a legend among them switches the curves of this section alone.
     """
 
     id: str
@@ -371,6 +374,8 @@ class PageContent:
     title, about : the heading and the small line below it.
     answer : sentences of what was found, from the file's numbers.
     facts : at most four of these numbers.
+    sections : the parts of the page, in order.
+    previous, following : file and name of the pages before and after this one; None: there is none.
     data : for a script of this page alone, by the id of its element.
     """
 

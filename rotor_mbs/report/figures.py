@@ -25,8 +25,8 @@ from rotor_mbs.scenario.scene import scene_tables
 from rotor_mbs.solution.trajectory import Array
 
 MOTION, PATHS, TORQUES = "motion", "paths", "torques"
-# The models that are compared, by key, in order from left to right; the last one is drawn by its
-# difference.
+# Headings of the models' columns, by key, from left to right. An independent model has no column:
+# it is drawn by its difference alone.
 HEADINGS = {"printed": "As printed", "corrected": "Corrected model"}
 DIFFERENCE = "Difference"  # from the corrected model; the caption says so
 REFERENCE_HEADING = "Motion"  # of a scene without a printed model, in which nothing was corrected
@@ -46,7 +46,7 @@ class PaperFigure(NamedTuple):
 
     number: str
     kind: str
-    # the letter ("" where it has none; a torque) and the scene of each
+    # (letter, scene) of each; the letter may be "", or a torque
     panels: tuple[tuple[str, str], ...]
 
 
@@ -264,7 +264,7 @@ def composed(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> canvas.P
         for axes in panels.axes:
             if not axes.has_data():
                 axes.set_axis_off()
-        for row in table:  # the labels of the first column are for all models
+        for row in table:  # labels of the vertical axis are in the first column alone
             for axes in row[1 : len(keys)]:
                 axes.set_ylabel("")
         for row, letter in zip(table, pictures if is_paths else (), strict=False):

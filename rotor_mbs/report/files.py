@@ -28,7 +28,7 @@ _MARK = f'<meta name="generator" content="{GENERATOR}">'.encode()  # of every pa
 INDEX = "index.html"
 _TEMPLATES = Path(__file__).resolve().parent / "templates"
 _LONGEST = 100  # characters; file systems allow 255 bytes
-_OTHERS = "data--"  # the beginning of the names of other pages than those of scenes
+_OTHERS = "data--"  # how names of pages of comparisons begin
 # The pages that are not scenes, by their name.
 MAIN_PAGES = (
     "index",
@@ -41,13 +41,13 @@ MAIN_PAGES = (
     "sweep",
     "comparison",
 )
-_SCRIPTS = {  # by file, what a page has that needs it
+_SCRIPTS = {  # by file: a text that is in a page that needs the script
     "plots": 'class="plot"',
     "tables": "aria-sort=",
     "viewer": 'class="viewer"',
     "map": 'id="sweep"',
 }
-MAX_NUMBERS = 150_000  # of a page's curves: 800 kB, so that a page has at most 1 MB
+MAX_NUMBERS = 150_000  # in a page's curves: 800 kB, so that a page has at most 1 MB
 _PLACE_OF_SCRIPTS = "<!-- scripts -->"
 Pairs = Sequence[tuple[str, str]]
 # Control characters but those of lines and tabs, and halves of surrogate pairs: names and messages

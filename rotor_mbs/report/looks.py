@@ -38,7 +38,7 @@ PALETTE = {
     "error-1": ("#b0568c", "#f2a3c8"),
     "error-2": ("#8a6a00", "#e3c04a"),
     "error-3": ("#7a5cc2", "#b6a2f7"),
-    # Coordinates: Tol's muted ones, the rotor, then a blade each.
+    # Coordinates: after Tol's muted colours; the rotor, then the blades.
     "rotor": ("#4a5058", "#c9ced4"),
     "blade-1": ("#882255", "#e583b2"),
     "blade-2": ("#2a8a7e", "#62cdbf"),
@@ -63,10 +63,10 @@ INK, PAPER, GREY, RING, BLUE, VERMILLION = (
 COORDINATES = tuple(
     PALETTE[name][0] for name in PALETTE if name == "rotor" or name.startswith("blade-")
 )
-# matplotlib's own black
+# Names of the light colours; matplotlib's black is that of texts.
 _NAMES = {light: name for name, (light, _) in PALETTE.items()} | {"#000000": "ink"}
-# Of the models in the order of the catalogue, for their methods in turn; those of other packages
-# are grey.
+# Colours of each model, in the order of the catalogue, for its methods in turn. Further models are
+# grey.
 _MODEL_COLOURS = (("blue", "navy"), ("brown", "vermillion"), ("green",), ("purple",))
 _ERRATA = (("error-1", "^"), ("error-2", "P"), ("error-3", "h"))  # colour and marker
 # matplotlib's line styles, and what the style sheet calls them.
@@ -123,7 +123,7 @@ def _catalogue_looks() -> dict[str, Look]:
         place, turn = models.setdefault(model, len(models)), counts[model]
         colours = _MODEL_COLOURS[place] if place < len(_MODEL_COLOURS) else ("grey",)
         marker = _MARKERS[(turn + 3 * place) % len(_MARKERS)]
-        # A model's colours in turn with one line, then with the next one.
+        # A model's colours in turn with one line style, then with the next.
         line = list(_DASHES)[turn // len(colours) % len(_DASHES)]
         looks[curve] = Look(PALETTE[colours[turn % len(colours)]][0], line, marker)
         counts[model] += 1

@@ -9,7 +9,7 @@ from markupsafe import Markup, escape
 
 NOTHING = "–"  # a number that does not exist
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-# Of mechanical quantities: a moment of 1e-3 N m beside others of 1e3 N m is small, not "1 mN m".
+# There are none below 1: a moment of 1e-3 N m beside others of 1e3 N m is small, not "1 mN m".
 _PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""))
 SPACE = "\N{NO-BREAK SPACE}"
 _COMPUTED = re.compile(r"(?<![\w./-])(-?\d+(?:\.\d+)?)e([+-]?\d+)\b")
@@ -20,7 +20,7 @@ _SYMBOL_IN_PROSE = re.compile(
     r"(?<![A-Za-z&#])(?<!kg )(?<!N "
     r")(q̇|[cdmqsUα-ω])(\d+(?:,\d)?)?(?![A-Za-z'])"
 )
-_ALONE_IN_PROSE = "cdm"  # symbols there without an index
+_ALONE_IN_PROSE = "cdm"  # letters that are symbols in prose though they have no index
 _SIGN = re.compile(r"(?<![\w)])-(?=\S)|(?<= )-(?= )")
 
 

@@ -24,15 +24,16 @@ ANGLE_AXIS, RATE_AXIS = "angle (rad)", "rate (rad/s)"
 # Smallest value that is drawn on a logarithmic axis: a hundredth of the rounding error of a double
 # of order one.
 LOWEST = 1e-18
-HIGHEST = 1e15  # rad, or J: beyond it is a divergence alone
-# Values larger than this many times the 90 % quantile are cut off.
+HIGHEST = 1e15  # rad, or J: only a divergence is larger
+# A divergence is larger than this many times the 90 % quantile; it is cut off.
 _RUNAWAY = 8.0
-_STILL = 10.0  # times what it is in the last samples, at most, where it has not passed
+# The largest value counts as at most this many times the last samples: a larger peak has passed.
+_STILL = 10.0
 # A range (rad, rad/s) that is rounding error.
 _ROUNDING = 1e-9
-# of a curve that is drawn; of more the smallest and the largest of equal intervals
+# Largest number of points of a curve; see `thin`.
 _MAX_POINTS = 4000
-_AZIMUTH, _ELEVATION = np.radians((-62.0, 14.0))  # of the direction from which paths are seen
+_AZIMUTH, _ELEVATION = np.radians((-62.0, 14.0))  # of the view of paths
 
 
 class Series(NamedTuple):
@@ -103,7 +104,7 @@ def set_range(axes: Any, values: Array) -> None:
         axes.set_ylim(-2.0 * usual, 2.0 * usual)
     elif values.max() - values.min() < _ROUNDING:
         middle = 0.5 * float(values.max() + values.min())
-        # to 1e16 a tenth adds nothing
+        # From about 1e15 on a tenth is lost to rounding.
         margin = 0.1 if middle + 0.1 > middle else 0.05 * abs(middle)
         axes.set_ylim(middle - margin, middle + margin)
 
@@ -195,7 +196,7 @@ def thin(time: Array, values: Array) -> tuple[Array, Array]:
 def is_cut(values: Array) -> bool:
     """Return whether the largest of these values (n, curves) are a divergence.
 
-    They are, where they exceed the usual values by far and have not come down again at the end: a
+    They are, where they exceed the usual values by far and the last samples are not small again: a
     jolt that passes is not a divergence.
     """
     largest = np.abs(values).max(axis=1)

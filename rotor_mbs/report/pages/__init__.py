@@ -116,9 +116,9 @@ METRICS = (
     "run_time_s",
     "setup_time_s",
 )
-# Against the reference, which has none itself.
+# Errors against the reference, which has none of its own.
 _ERRORS_OF_RUNS = ("angle_error_max", "angle_error_predicted", "angle_error_whole", "tip_error_max")
-_SPAN = 30.0  # between the smallest and the largest value, beyond which an axis is logarithmic
+_SPAN = 30.0  # ratio of largest to smallest value beyond which an axis is logarithmic
 _METHODS_IN_A_TABLE = 8  # side by side on a page of 1440 px
 
 
@@ -183,7 +183,7 @@ def metric(run: StoredRun, name: str) -> float | None:
 
 
 def number_cell(value: float | None, tone: str = "") -> TableCell:
-    """Return a number that a table sorts by."""
+    """Return a cell with a number, by which a table is sorted; `tone` is that of the cell."""
     order = value if value is not None and math.isfinite(value) else None
     return TableCell(number(value), tone, order=order)
 
@@ -209,13 +209,16 @@ def compared_time(scenes: Iterable[StoredScene]) -> tuple[float, float]:
 
 
 def is_wide(values: Array) -> bool:
-    """Return whether values are positive and span so much that a logarithmic axis shows more."""
+    """Return whether an axis of these values should be logarithmic.
+
+    It should, where all are positive and the largest is more than 30 times the smallest.
+    """
     known = values[np.isfinite(values)]
     return bool(len(known)) and bool(known.min() > 0.0) and bool(known.max() > _SPAN * known.min())
 
 
 def models_of(methods: Collection[str]) -> int:
-    """Return how many models, which share no code, these methods belong to."""
+    """Return how many models these methods belong to. Models share no code."""
     return len({method.partition("/")[0] for method in methods})
 
 
@@ -254,10 +257,13 @@ def agreement(scene: StoredScene) -> tuple[list[str], float | None]:
 def agreement_of_scenes(scenes: Iterable[StoredScene]) -> tuple[list[str], float | None, int]:
     """Return how the corrected methods agree over several scenes.
 
+    Parameters
+    ----------
+    scenes : those without a method that was compared with a reference are left out.
+
     Returns
     -------
-    methods : those that are ok in every scene that was compared at all; none, where the scenes have
-        different ones.
+    methods : those that are ok in every scene that was compared; none where no method is in all.
     error : rad, the largest angle error of any run that is ok; None where none was compared with a
         reference.
     count : of the scenes that were compared.
@@ -273,12 +279,12 @@ def agreement_of_scenes(scenes: Iterable[StoredScene]) -> tuple[list[str], float
 
 
 def agree_within(methods: Sequence[str], error: float, digits: int = 1) -> Markup:
-    """Return the beginning of a sentence: "three independent computations agree within 2×10⁻⁶ rad".
+    """Return a clause: "three independent computations agree within 2×10⁻⁶ rad".
 
     Parameters
     ----------
-    methods : that agree; of one it is said that it agrees with the reference, of none what they
-        have in common.
+    methods : those that agree. A single one agrees with the reference; without any, the subject is
+        all runs that are ok.
     error : rad, the largest.
     digits : of the error, which is rounded up.
     """

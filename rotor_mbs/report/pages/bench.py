@@ -41,13 +41,13 @@ from rotor_mbs.solution.status import COMPLETE
 from rotor_mbs.studies.stability import SuiteRun, suite_runs
 
 _POINT_COLUMNS = ("angle_error_max", "defect_max", "energy_drift_max", "run_time_s", "steps")
-_MAX_POINTS = 800  # in the tables of a page; of more only those that are not ok
+_MAX_POINTS = 800  # in a page's tables; where there are more, only those not ok
 _ERRORS = {
     work_precision.ANGLE_ERROR: "Largest angle error",
     "defect_max": "Largest interval defect",
 }
 _ENGINE_TARGETS = (1e-6, 1e-9, 1e-10)  # rad
-_LONG_S = 100.0  # of a run whose energy drift says something
+_LONG_S = 100.0  # shortest run whose energy drift is shown
 _NO_ENGINE = (
     "rotor_mbs",
     "python",
@@ -55,7 +55,7 @@ _NO_ENGINE = (
     "h5py",
     "code",
     "plug-in",
-)  # among the versions of a row
+)  # versions that are not those of an engine
 _FRONT = Look(PALETTE["ring"][0], "-", "", "best of all methods")
 _LOWEST_ERROR = 1e-16  # rad: smaller ones are drawn there
 _METHODS_IN_A_TABLE = 7  # beside the scene
@@ -446,7 +446,7 @@ def engine_tables(results: OpenResults, scenes: Mapping[str, Sequence[Record]]) 
     suite = [
         run for run in suite_runs(results.path) if run.scene.startswith(("stiff/", "extreme/"))
     ]
-    # The shortest that is long enough.
+    # The energy drift is that of the shortest scene that is long enough.
     durations = {
         name: scene.duration for name, scene in parsed.items() if results.scenes[name].methods
     }
@@ -573,7 +573,7 @@ def _reach_cell(
     target : the error, rad.
     """
     reached: dict[str, work_precision.Reach] = {}
-    cut = 0  # scenes on which it was not measured to there
+    cut = 0  # scenes on which the settings that may reach it were left out
     for name, curves in own.items():
         ranked = work_precision.fastest(scenes[name], target)
         reach = next(
@@ -647,7 +647,7 @@ def _false_success_cell(
     suite : its runs of the stability suite; without any the settings in `own` are counted.
     """
     if suite:
-        # What the time limit ended is neither right nor wrong.
+        # A run that the time limit ended is neither right nor wrong.
         finished = [run for run in suite if run.status != "timed_out"]
         wrong = [run for run in finished if run.status not in ("ok", "unchecked")]
         claimed, count, late = (

@@ -411,7 +411,7 @@ def error_panels(record: Record) -> Panels:
         for channel in channels
     ]
     panels = plots.errors(series, f"error ({channels[0].unit})", verdict.horizon_s)
-    # also where no error is above zero, so that nothing is drawn
+    # Set it here: where no error is above zero nothing is drawn, and the axis would have no range.
     if len(rows) and rows[-1] > rows[0]:
         panels.axes[-1].set_xlim(rows[0], rows[-1])
     if verdict.axis == "speed":

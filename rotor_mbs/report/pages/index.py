@@ -535,7 +535,7 @@ def _status_cell(scene: StoredScene) -> TableCell:
     good = len(scene.corrected_runs)
     if good:
         return TableCell(f"✓ {good} of {good}", "good", order=good)
-    # Of the printed equations, and of a reference alone, nothing was checked.
+    # Runs of the printed equations, and a reference alone, were not checked.
     ended = ", ".join(dict.fromkeys(map(status_text, scene.methods.values())))
     return TableCell(ended or "reference only", order=0)
 

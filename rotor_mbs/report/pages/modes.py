@@ -44,7 +44,7 @@ from rotor_mbs.solution.trajectory import Array
 
 _MARKS = ("o", "s", "^", "D", "v", "P", "x")
 _TURN = 2.0 * math.pi
-_ZERO = 1e-6  # of the largest frequency: a smaller one is that of a rigid motion
+_ZERO = 1e-6  # share of the largest frequency; below it is that of a rigid motion
 _NOTHING = 1e-9  # 1/s, or of a frequency: a smaller growth or damping is rounding error
 
 
@@ -70,7 +70,7 @@ class ModePlots:
         frequencies, speeds = modes.damped_frequencies, modes.speeds
         top = float(np.nanmax(frequencies, initial=0.0)) * 1.08 or 1.0
         apart = float(speeds[-1]) > 0.05 * top  # else the labels would lie on each other
-        # Gravity acts once a turn, a tower or a yaw error on each blade in turn.
+        # Gravity excites a blade once per revolution, a tower or a yaw error each blade in turn.
         harmonics = sorted({1, 2, modes.blades, 2 * modes.blades})
         for k in harmonics:
             panel.axes[0].plot(speeds, k * speeds, color=GREY, linewidth=0.7, linestyle=":")

@@ -89,7 +89,7 @@ DEFECT_NOTE = (
     "interval. Defects do not depend on the growth of errors over the run and cover all of it."
 )
 _PITCH = "Pitch angle"
-_NO_ENERGY = 1e-15  # of the energy scale: a smaller gain is rounding error
+_NO_ENERGY = 1e-15  # share of the energy scale; a smaller gain is rounding error
 _TURN = 2.0 * math.pi
 _RPM = 30.0 / math.pi  # rev/min of a rad/s
 

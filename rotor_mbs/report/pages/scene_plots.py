@@ -20,20 +20,20 @@ from rotor_mbs.scenario.time_table import kink_times, values_at
 from rotor_mbs.solution.quantities import DEFECT, LOADS, Quantity, known_quantities
 
 Runs = Mapping[str, StoredRun]
-VISIBLE = 0.05  # rad: what one can see in a figure of the paper's size
+VISIBLE = 0.05  # rad: a difference that is visible in a figure of the paper's size
 CORRECTED, PRINTED = "corrected", "printed"  # keys of their curves
 CORRECTED_LOOK = Look(PALETTE["reference"][0], "-", "", "corrected")
 PRINTED_LOOK = Look(INK, "--", "", "as printed")
-# A curve that goes so many heights of the other one's range beyond it runs away, and is cut off.
+# A curve runs away, and is cut off, if it leaves the other's range by so many times that range.
 _RUNAWAY = 2.0
-_LEAST_HEIGHT = 0.5  # rad, rad/s: of one that hardly moves
-_ROUNDING = 1e-9  # of the largest component of a vector: what is smaller is zero
+_LEAST_HEIGHT = 0.5  # rad, rad/s: smallest range in that comparison
+_ROUNDING = 1e-9  # share of the largest component; a smaller one is zero
 LEAST_ANGLE = 1e-6  # rad, rad/s: a smaller range of an angle or a rate is not magnified
-# What is below a thousandth of a double's rounding error is a gap on a logarithmic axis, as an
-# exact zero is.
+# A value up to this is a gap on a logarithmic axis, as an exact zero is: it is far below the
+# rounding error of a double of order one.
 LOWEST = 1e-18
 _SPARK_WIDTH, _SPARK_HEIGHT, _SPARK_POINTS = 150.0, 34.0, 75
-_ALIGNED = 1e-9  # of a time: a sample nearer to a jump is the one before it
+_ALIGNED = 1e-9  # relative: a sample nearer than that to a jump is before it
 
 
 def time_axis(time: Array) -> Horizontal:

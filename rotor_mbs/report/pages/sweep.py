@@ -47,10 +47,10 @@ from rotor_mbs.runs.sweeps import StoredSweep, parameter_name
 from rotor_mbs.solution.quantities import LOADS
 from rotor_mbs.solution.status import GOOD, STATUSES
 
-_COUNTS = ("steps", "rhs_evaluations", "time_reached")  # columns that say nothing of the motion
+_COUNTS = ("steps", "rhs_evaluations", "time_reached")  # columns that do not describe the motion
 _MAX_ROWS = 500  # of the table of all runs
-_MAX_CELLS = 24  # of a map in each direction
-# share of the variance of a quantity that a parameter explains, when it is said to decide
+_MAX_CELLS = 24  # in each direction of a map
+# A parameter decides if it explains more than this share of the variance of a quantity.
 _DECIDES = 0.6
 _COORDINATE = re.compile(r"initial\.(angles|rates)\[(\d+)\]")
 
@@ -70,7 +70,11 @@ class RunQuantity:
 
 
 class _Sweep:
-    """A stored sweep and what several parts of its page need."""
+    """A stored sweep with the columns that several parts of its page need.
+
+    statuses, numbers, codes : (runs,) status, number and method of each run.
+    keys, parameters : names of the varied parameters, and their values (runs,) by name.
+    """
 
     def __init__(self, stored: StoredSweep) -> None:
         self.stored = stored
@@ -289,7 +293,7 @@ def run_quantities(sweep: _Sweep) -> list[RunQuantity]:
     for quantity in found:
         values = np.where(complete, quantity.values, np.nan)
         known = values[np.isfinite(values)]
-        # A range that is rounding error says nothing.
+        # A quantity whose range is rounding error is left out.
         if len(known) > 1 and float(np.ptp(known)) > 1e-9 * float(np.abs(known).max()):
             shown.append(RunQuantity(quantity.name, quantity.unit, values))
     return shown
@@ -558,7 +562,8 @@ def _curves(sweep: _Sweep, shown: NDArray[np.bool_]) -> tuple[list[Plot], NDArra
         if unit == "N m":
             known = [float(np.abs(table[np.isfinite(table)]).max(initial=0.0)) for table in tables]
             scale, prefix = prefix_of(max(known))
-        # What follows from a load is interrupted at its jumps.
+        # Quantities that follow from a load are interrupted at its jumps, at the next sample that is
+        # taken.
         breaks = (
             [-(-place // every) for place in jumps.breaks(time)] if title.endswith("moment") else []
         )
@@ -767,7 +772,7 @@ def _faults_section(sweep: _Sweep, *, with_links: bool) -> Section:
     groups: dict[tuple[int, str], list[int]] = {}
     messages = [text_of(characters) for characters in sweep.stored.column("message")]
     for run in np.flatnonzero(~sweep.is_good).tolist():
-        # Reasons that differ by their numbers alone are one.
+        # Reasons that differ in numbers alone belong to one group.
         words = re.sub(r"[-+]?\d[\d.]*(e[-+]?\d+)?", "#", messages[run])
         groups.setdefault((int(sweep.statuses[run]), words), []).append(run)
     rows: list[Row] = []

@@ -15,12 +15,12 @@ from rotor_mbs.runs.read import StoredRun, StoredScene
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.trajectory import Array
 
-# of a page of a size that can be mailed; a shorter run has a frame for each sample
+# So many that a page can be sent by mail; a run with fewer samples has a frame for each.
 MAX_FRAMES = 2401
-# rad from a frame to the next beyond which the page says that it interpolates
+# rad from a frame to the next; beyond it the page says that it interpolates.
 _COARSE = 0.5 * math.pi
 _DECIMALS = 4  # of an angle in rad: a pixel at the tip on any screen
-_VISIBLE = 0.1  # of the longest blade
+_VISIBLE = 0.1  # share of the longest blade's length
 
 
 def viewer(stored: StoredScene, runs: Mapping[str, StoredRun]) -> dict[str, Any] | None:
