@@ -73,6 +73,7 @@ def page_names(scenes: Iterable[str]) -> dict[str, str]:
     taken = {f"{name}.html" for name in MAIN_PAGES}
     for scene in scenes:
         if {"..", "."} & set(re.split(r"[/\\]", scene)):
+            # Such a name would leave the folder of the report.
             raise StoreError(
                 f"scene name {scene!r} cannot be made a file name; allowed: no part .. or ."
             )

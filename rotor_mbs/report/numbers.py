@@ -116,7 +116,7 @@ def up_to(value: float | None, digits: int = 2) -> str:
 def span(low: float, high: float, digits: int = 3, unit: str = "") -> str:
     """Return a range, both ends to the digits of the larger one.
 
-    A number that is small beside the larger end is thus written as zero.
+    A number that is much smaller than the larger end is thus written as zero.
 
     Parameters
     ----------

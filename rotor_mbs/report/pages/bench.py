@@ -127,6 +127,7 @@ def bench_answer(scenes: Mapping[str, Sequence[Record]]) -> list[Markup]:
             reached += 1
             winner = ranked[0][0].method
             wins[winner] += 1
+            # The fastest method of another model: methods of one model share code.
             other = next(
                 (pair for pair in ranked if _model(pair[0].method) != _model(winner)), None
             )
@@ -141,6 +142,7 @@ def bench_answer(scenes: Mapping[str, Sequence[Record]]) -> list[Markup]:
             shortest(target), label_of(winner), where
         )
         if ratios:
+            # The method that most often is the fastest of the other models.
             second = max(ratios, key=lambda method: len(ratios[method]))
             factor = number(float(np.median(ratios[second])))
             text += Markup("; of another model {}, {} times slower").format(
@@ -288,6 +290,7 @@ def diagram(
     errors, seconds = np.concatenate(list(drawn.values()), axis=1)
     front = work_precision.pareto(errors, seconds)
     plotted = []
+    # The front comes first, so that the curves are drawn upon it.
     if len(front) > 1:
         order = front[np.argsort(seconds[front])]
         plotted.append(
@@ -463,6 +466,7 @@ def engine_tables(results: OpenResults, scenes: Mapping[str, Sequence[Record]]) 
             for name, of_scene in scenes.items()
         }
         own = {name: of_scene for name, of_scene in own.items() if of_scene}
+        # A scene counts as ok where at least one setting is.
         with_ok = [curves for curves in own.values() if any("ok" in c.statuses for c in curves)]
         reached.append(
             [
@@ -551,6 +555,7 @@ def _worst_cell(own: Mapping[str, Sequence[Record]], column: str) -> TableCell |
         return (
             (TableCell("not measured") if is_cut else TableCell("none", "bad")) if own else NOTHING
         )
+    # The value is an upper bound where finer settings were left out there.
     worst = max(known, key=lambda name: known[name])
     bound = "≤ " if any(map(work_precision.left_out, own[worst])) else ""
     note = worst if len(own) > 1 else ""

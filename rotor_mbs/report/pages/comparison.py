@@ -261,6 +261,7 @@ def _channel_section(record: Record, verdict: DataVerdict, marks: Sequence[Mark]
                 curves,
                 170,
                 clip=clip,
+                # the first plot has the texts of the marks
                 marks=marks if not plots else [Mark("", mark.x) for mark in marks],
                 still=len(plots) < 2,
             )

@@ -230,6 +230,7 @@ def _hero_section(scene: StoredScene, report: Report) -> Section:
     printed, corrected = scene.sides[PRINTED], scene.sides[CORRECTED]
     link = Markup('<a href="{}">More on this scene</a>').format(report.files[scene.name])
     say = Markup("{}. ").format(typeset_title(scene.title))
+    # With a published number that the printed equations reproduce the line is more specific.
     for claim in claims:
         if claim.is_number and claim.printed is not None and rounds_to(claim.printed, claim):
             ends = [float(run.array("angles")[-1, 0]) for run in (printed, corrected)]
@@ -256,6 +257,7 @@ def scene_table(report: Report) -> PageTable:
     report : the open results file.
     """
     rows: list[Row] = []
+    # A scene in which fewer methods than in others agree has a note.
     most = max((len(agreement(scene)[0]) for scene in report.scenes.values()), default=0)
     for name, scene in report.scenes.items():
         note = typeset_title(scene.title)
@@ -298,6 +300,7 @@ def _departure_cells(scene: StoredScene) -> list[TableCell | str]:
     coordinate = draw.differing_coordinate(printed, corrected)
     right = corrected.array("angles")[:, coordinate]
     low, high = float(right.min()), float(right.max())
+    # The range of the corrected model; the printed one is cut off where it leaves this by far.
     room = max(0.6 * (high - low), 0.2)
     picture = draw.spark(
         [

@@ -412,6 +412,7 @@ def _faults(scene: StoredScene) -> list[Markup]:
                 with_capital(label_of(method)), status_text(run)
             )
         sentences.append(text + (f": {reason}." if reason else "."))
+    # Many failures are named together: the reasons are in the tables.
     if len(sentences) > 2:
         names = [
             label_of(method)
@@ -646,6 +647,7 @@ def _powers(scene: Scene, run: StoredRun, jumps: Jumps) -> list[Channel]:
                 len({value for _, value in table}) > 1 for table in (torque_table, rest_table)
             ):
                 continue
+            # The moment of an actuator: a torque, a spring to the commanded angle, and a damper.
             torque, rest = (values_at(table, before) for table in (torque_table, rest_table))
             stiffness, damping = scene.bearings[i]
             moment = torque + stiffness * (rest - angles[:, 1 + i]) - damping * rates[:, 1 + i]

@@ -37,6 +37,7 @@ def stability_page(report: Report) -> PageContent:
         for scene, file in report.files.items()
         if any(run.scene == scene for run in runs)
     }
+    # A singular run without a reference is left out: its scene may have no solution.
     compared = [run for run in runs if run.has_reference or run.status != "singular"]
     good = {
         method: sum(run.outcome == "ok" for run in compared if run.method == method)
@@ -116,6 +117,7 @@ def stability_page(report: Report) -> PageContent:
             rows.append(row)
         tables.append(PageTable("Statuses", ("Scene", *map(method_cell, shown)), rows))
     used = {run.outcome for run in runs}
+    # The key explains the outcomes that are in the map, and no others.
     key = [(symbol, text) for outcome, (symbol, text) in OUTCOMES.items() if outcome in used]
     if claimed:
         key.append(("!", "the engine reported success for a wrong result"))

@@ -562,8 +562,8 @@ def _curves(sweep: _Sweep, shown: NDArray[np.bool_]) -> tuple[list[Plot], NDArra
         if unit == "N m":
             known = [float(np.abs(table[np.isfinite(table)]).max(initial=0.0)) for table in tables]
             scale, prefix = prefix_of(max(known))
-        # Quantities that follow from a load are interrupted at its jumps, at the next sample that is
-        # taken.
+        # Quantities that follow from a load are interrupted at its jumps: at the first sample after
+        # it that is taken.
         breaks = (
             [-(-place // every) for place in jumps.breaks(time)] if title.endswith("moment") else []
         )
@@ -783,6 +783,7 @@ def _faults_section(sweep: _Sweep, *, with_links: bool) -> Section:
             values = sweep.parameters[key][runs]
             low, high = brief(values.min()), brief(values.max())
             row.append(low if low == high else f"{low} to {high}")
+        # The example of a group is the run with the largest defect.
         sizes = np.asarray(sweep.stored.column("defect_max"))[runs]
         worst = runs[int(np.nan_to_num(sizes, nan=-1.0).argmax())]
         reason = messages[worst] or "no reason is stored"

@@ -50,6 +50,7 @@ def viewer(stored: StoredScene, runs: Mapping[str, StoredRun]) -> dict[str, Any]
             moves[name] = time[:count], angles[:count]
     if not moves:
         return None
+    # Both runs have frames at the same times, up to the end of the longer one.
     longest = max((time for time, _ in moves.values()), key=lambda time: float(time[-1]))
     if longest[-1] <= 0.0:
         return None
