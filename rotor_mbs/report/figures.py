@@ -108,7 +108,7 @@ def compared_runs(scene: StoredScene) -> dict[str, StoredRun]:
     candidates = scene.sides
     for name, run in scene.corrected_runs.items():
         method = find_method_or_none(name)
-        # The reference is of the Lagrange model: a run of that model would not be independent of it.
+        # The reference is of the Lagrange model: another run of that model is not independent.
         is_other = not name.startswith("lagrange/") and (method is None or method.name != REFERENCE)
         if is_other and run.samples and run not in candidates.values():
             candidates[INDEPENDENT] = run

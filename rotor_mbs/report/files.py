@@ -73,11 +73,10 @@ def page_names(scenes: Iterable[str]) -> dict[str, str]:
     taken = {f"{name}.html" for name in MAIN_PAGES}
     for scene in scenes:
         if {"..", "."} & set(re.split(r"[/\\]", scene)):
-            # Such a name would leave the folder of the report.
             raise StoreError(
                 f"scene name {scene!r} cannot be made a file name; allowed: no part .. or ."
             )
-        # Characters that every file system and every address allows.
+        # Only characters that every file system allows and that stay as they are in an address.
         stem = re.sub(r"[^A-Za-z0-9._-]+", "-", scene)[:_LONGEST].strip(".-") or "scene"
         stem = f"scene-{stem}" if stem.lower().startswith(_OTHERS) else stem
         name, number = f"{stem}.html", 2
