@@ -271,7 +271,7 @@ def diagram(
 ) -> Plot | None:
     """Return the work-precision diagram of a scene; None where it has no point.
 
-    The Pareto front of all curves is drawn below them.
+    The Pareto front of all curves is drawn behind them.
 
     Parameters
     ----------
@@ -385,7 +385,7 @@ def _reach_section(scenes: Mapping[str, Sequence[Record]]) -> Section:
 
 
 def _methods_section(results: OpenResults, scenes: Mapping[str, Sequence[Record]]) -> Section:
-    """Return the section with a fold per method, whose heading has its results in short.
+    """Return the section with a fold per method, whose heading summarizes its results.
 
     Parameters
     ----------

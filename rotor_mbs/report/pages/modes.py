@@ -417,7 +417,7 @@ def _turning(scene: SceneModes, name: str, axis_name: str) -> Section | None:
 
     Parameters
     ----------
-    scene : its modes; a single speed is no plot.
+    scene : its modes; the section needs multipliers at two speeds or more.
     name : begins the id of the section and the keys of the curves.
     axis_name : of the horizontal axis, as for `_campbell`.
     """
