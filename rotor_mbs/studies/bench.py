@@ -70,8 +70,15 @@ _MOST_INTERVALS = 100
 
 @dataclass(frozen=True, eq=False)
 class Point:
-    """One method at one setting, a step (s) or tolerance. known: its columns that are known before
-    it is measured."""
+    """Hold one method at one setting.
+
+    Attributes
+    ----------
+    method : name of the method.
+    setting : the step (s) or the tolerance.
+    settings : settings of the method that the ladder sets.
+    known : columns of the row that are known before it is measured, by name.
+    """
 
     method: str
     setting: float
@@ -81,14 +88,15 @@ class Point:
 
 @dataclass(frozen=True)
 class Curve:
-    """A method over its ladder of settings on one scene, coarse to fine: consecutive rows of the
-    table.
+    """Hold a method over its ladder of settings on one scene: consecutive rows of a table.
 
     Attributes
     ----------
-    name : the method's, with its fixed settings where they are not the default ones.
+    scene : the scene.
+    name : the method's name, with its fixed settings where they are not the default ones.
     kind : STEP or TOLERANCE.
-    table : of its rows.
+    points : one for each setting, coarse to fine.
+    table : name of the table of its rows.
     target : rad; the step that makes this error is looked for; 0 where none is.
     """
 
@@ -109,11 +117,11 @@ class Curve:
 
     @property
     def key(self) -> tuple[str, str, str]:
-        """By which its rows are found: table, scene, curve."""
+        """Return the table, scene and curve by which its rows are found."""
         return self.table, self.scene.name, self.name
 
     def places(self, file: TableFile) -> list[RowLocation]:
-        """Where its rows are."""
+        """Return the locations of its rows in `file`."""
         return [file.place(str(point.known["run"]), self.table) for point in self.points]
 
     def is_stored(self, file: TableFile) -> bool:
@@ -121,8 +129,17 @@ class Curve:
 
 
 def curve_of(scene: Scene, method: Method, ladder: Ladder, options: Mapping[str, object]) -> Curve:
-    """Return the curve of a method's ladder. options: of the study, stored with each point, with
-    facts of the method that a page may want."""
+    """Return the curve of a method's ladder on a scene.
+
+    The points end at the first setting that the scene does not allow, a step too small for its
+    duration.
+
+    Parameters
+    ----------
+    scene, method : what is run.
+    ladder : settings of the method, coarse to fine; its variant is part of the curve's name.
+    options : of the study, stored with each point, with facts of the method for the report.
+    """
     name, (short, _) = method.name + ladder.variant, coarsened(scene)
     facts = {
         **options,
@@ -151,15 +168,22 @@ def curve_of(scene: Scene, method: Method, ladder: Ladder, options: Mapping[str,
 
 
 class PointTimer:
-    """Builds a point, runs it as often as asked, and judges the last run.
+    """Build a point, run it as often as asked, and judge the last run.
+
+    Parameters
+    ----------
+    point, scene : what is run.
+    reference : angles that errors are taken from; None without one.
+    warm_up_limit_s : s, after which the warm-up run is ended.
+    clock : function that returns a time in s.
 
     Attributes
     ----------
-    warm_s : s, of the warm-up run; of a point that failed until then.
-    is_repeatable, is_stopped : whether the warm-up run came back; whether it was ended at its
-        limit.
+    warm_s : s, of the warm-up run; where the point failed, the time until then.
+    is_repeatable : whether the warm-up run was completed without an error.
+    is_stopped : whether the warm-up run was ended at its limit.
     times : s, of the timed runs.
-    left_out : why it was not run.
+    left_out : why it was not run; "" if it was.
     """
 
     def __init__(
@@ -178,7 +202,11 @@ class PointTimer:
         self.times: list[float] = []
 
     def warm_up(self) -> None:
-        """Build twice, the first time with everything compiled, and run once."""
+        """Build the solver twice, the second time with everything compiled, and run it once.
+
+        An error is not raised but becomes the outcome of the point; only errors of the system are
+        raised.
+        """
         start = self._clock()
         try:
             method = catalogue.find_method(self._point.method)
@@ -213,13 +241,16 @@ class PointTimer:
             self.warm_s = self._clock() - start
 
     def run(self) -> float:
-        """Seconds of one run."""
+        """Integrate once and return the time taken in s."""
         start = self._clock()
         self._integration = self._solver.integrate()
         return self._clock() - start
 
     def row(self) -> dict[str, Any]:
-        """The columns of the point, and `same`: whether the last run is bit for bit the first."""
+        """Return the columns of the point, by name.
+
+        `same` tells whether the angles of the last run equal those of the first bit by bit.
+        """
         if self.is_repeatable:
             return self._setup | statistics(self.times) | self.judge()
         status, message = ("left_out", self.left_out) if self.left_out else self._failure
@@ -227,8 +258,14 @@ class PointTimer:
         return {"status": status, "message": message, "run_time_s": self.warm_s, **nothing}
 
     def judge(self) -> dict[str, Any]:
-        """Return status, message, metrics and steps of the last run, and the time to read out and
-        compute its samples."""
+        """Return the judgement of the last run, with the time to compute its samples.
+
+        Returns
+        -------
+        dict
+            Columns by name: status, message, metrics, steps, output_time_s (s) and `same`. A run
+            that did not reach the end has no metrics: they would be of its part.
+        """
         start = self._clock()
         trajectory = self._solver.observe()
         output = self._clock() - start
@@ -254,8 +291,10 @@ class PointTimer:
 
 
 def statistics(times: Sequence[float]) -> dict[str, float]:
-    """Statistics of run times in s, by the names they are stored under; quartiles between the order
-    statistics."""
+    """Return statistics of run times in s, by the names they are stored under.
+
+    Quartiles are interpolated between the order statistics.
+    """
     low, middle, high = map(float, np.quantile(times, (0.25, 0.5, 0.75)))
     return {
         "run_time_s": middle,
@@ -276,9 +315,10 @@ def time_in_rounds(
 
     Parameters
     ----------
-    ladders : each coarse to fine.
-    budget_s : for all of it, on `clock` (s).
-    repeats : of each point at most.
+    ladders : points, each ladder coarse to fine; their `times` are filled.
+    budget_s : s on `clock`, for all of it.
+    repeats : timed runs of each point at most; fewer where a run is longer than LONG_RUN_S.
+    clock : function that returns a time in s.
     """
     start = clock()
     _warm_all(ladders, budget_s, clock)
@@ -300,8 +340,16 @@ def time_in_rounds(
 def _warm_all(
     ladders: Sequence[Sequence[PointTimer]], budget_s: float, clock: Callable[[], float]
 ) -> None:
-    """Warm up all rungs; the one expected to be cheapest comes next. What is left over when even
-    that one does not fit is left out."""
+    """Warm up all rungs, always the one next that is expected to be cheapest.
+
+    Where even that one does not fit the budget, it and all finer ones of its ladder are left out.
+
+    Parameters
+    ----------
+    ladders : points, each ladder coarse to fine.
+    budget_s : s, of which warm-ups and building may take a share.
+    clock : function that returns a time in s.
+    """
     start, warm_s = clock(), 0.0
     waiting = [(0.0, 0, number) for number, ladder in enumerate(ladders) if ladder]
     while waiting:
@@ -322,10 +370,16 @@ def _warm_all(
 
 
 def allocate_repeats(seconds: Sequence[float], wanted: Sequence[int], budget_s: float) -> list[int]:
-    """Repeats of each point: all it wants or what an equal share of time allows, and one in any
-    case.
+    """Return the number of repeats of each point: what its share of time allows, at least one.
 
-    What points that want less than their share leave is shared by the others.
+    A point gets no more than it wants. What points that want less than an equal share leave is
+    shared by the others.
+
+    Parameters
+    ----------
+    seconds : time of one run of each point, s.
+    wanted : repeats of each point at most.
+    budget_s : s, for all points.
     """
     counts = [0] * len(seconds)
     by_demand = sorted(range(len(seconds)), key=lambda i: wanted[i] * seconds[i])
@@ -343,14 +397,21 @@ def measure(
     repeats: int,
     budget_s: float,
 ) -> list[list[dict[str, Any]]]:
-    """Measure the columns of every point, by curve: timed in rounds over all points, then the last
-    run of each judged.
+    """Measure the columns of every point, by curve: timed in rounds over all points, then judged.
 
-    For a process that does nothing else: engines are loaded beforehand, which is part of no run's
-    time, and the garbage collector is off.
+    It is for a process that does nothing else: engines are loaded beforehand, which is part of no
+    run's time, and the garbage collector is off.
 
+    Parameters
+    ----------
+    curves : curves of one scene.
     scene, reference : as they are benched (`bench_inputs`).
     repeats, budget_s : timed runs of a point at most, and s for all of them.
+
+    Returns
+    -------
+    list of list of dict
+        Columns by name, for each point of each curve.
     """
     for method in dict.fromkeys(curve.method for curve in curves):
         catalogue.find_method(method).import_engine()
@@ -364,8 +425,18 @@ def measure(
 
 
 def bench_inputs(scene: Scene, place: RowLocation) -> tuple[Scene, Trajectory]:
-    """The scene as it is benched, without loads, and its reference, which is at `place`, at the
-    same samples. Raises InputError where there is none."""
+    """Return a scene as it is benched, without loads and with fewer samples, and its reference.
+
+    Parameters
+    ----------
+    scene : the scene with all its samples.
+    place : location of the reference in a results file.
+
+    Raises
+    ------
+    InputError
+        If there is no reference, or it does not reach the end.
+    """
     reference = read_reference(place, scene)
     if reference is None or len(reference.time) < scene.samples:
         raise InputError(
@@ -380,8 +451,11 @@ def bench_inputs(scene: Scene, place: RowLocation) -> tuple[Scene, Trajectory]:
 
 
 def coarsened(scene: Scene) -> tuple[Scene, int]:
-    """The scene with every k-th sample, and k: the finest thinning with at most 100 intervals, or
-    none."""
+    """Return the scene with every k-th sample, and k.
+
+    It is the finest thinning with at most 100 intervals; k is 1 where that would leave too few
+    samples.
+    """
     intervals = scene.samples - 1
     k = next(
         (
@@ -401,7 +475,10 @@ def coarsened(scene: Scene) -> tuple[Scene, int]:
 
 
 def curve_tables(curves: Sequence[Curve]) -> list[TableSpec]:
-    """The table of the points of these curves, which are all of one; [] of none."""
+    """Return the specification of the table with the points of `curves`, which share one table.
+
+    The list is empty if there are no curves.
+    """
     return (
         [points_table(curves[0].table, [p.known for curve in curves for p in curve.points])]
         if curves
@@ -411,12 +488,14 @@ def curve_tables(curves: Sequence[Curve]) -> list[TableSpec]:
 
 @dataclass(frozen=True, kw_only=True)
 class CurveTask(Task):
-    """A curve on its way to a worker process, each of its points run once.
+    """Run each point of a curve once, in a worker process.
 
-    longest_s : a run over this is the last: the next one takes several times as long. So is one
-        whose error is a tenth
-        of the curve's target.
-    limit_s : a run over this is ended.
+    Attributes
+    ----------
+    curve : the curve.
+    longest_s : s; a run over this is the last of the curve, as the next one takes several times as
+        long. So is one whose error is a tenth of the curve's target.
+    limit_s : s; a run over this is ended.
     """
 
     curve: Curve
@@ -424,7 +503,7 @@ class CurveTask(Task):
     limit_s: float
 
     def perform(self) -> Rows:
-        """Run and judge the points of one curve; their rows."""
+        """Run and judge the points of one curve, and return their rows."""
         curve, facts = self.curve, dict[str, Any]()
         scene, reference = curve.scene, None
         if curve.table == BENCH:
@@ -460,7 +539,15 @@ def curve_tasks(
     longest_s: float,
     limit_s: float = math.inf,
 ) -> list[CurveTask]:
-    """kill_after_s : of a whole curve."""
+    """Return a task for each curve, which runs each of its points once.
+
+    Parameters
+    ----------
+    file : the results file, which has a row for each point.
+    curves : the curves that are measured.
+    kill_after_s : s, after which the worker process of a whole curve is ended.
+    longest_s, limit_s : s, see `CurveTask`.
+    """
     return [
         CurveTask(
             label=curve.label,
@@ -488,15 +575,17 @@ def run_bench(
     workers: int,
     on_progress: OnProgress = ignore_progress,
 ) -> tuple[list[RunOutcome], list[catalogue.Refusal]]:
-    """Measure the curves of every scene into the results file `output`; what it has already is
-    kept.
+    """Measure the curves of every scene into a results file; what it has already is kept.
 
     Parameters
     ----------
-    methods : whose ladders are measured; all where none is named.
+    scenes : the scenes, each of which needs a reference that reaches the end.
+    methods : names of methods whose ladders are measured; all where none is named.
+    output : the results file.
     repeats : timed runs of each point at most.
     budget_s : s, for all curves of a scene.
     workers : processes that compute references before the first curve is timed.
+    on_progress : called after each curve.
 
     Returns
     -------
@@ -511,7 +600,7 @@ def run_bench(
     InputError
         For a method without a ladder, and if no curve is left.
     StoreError
-        Where the file cannot be read or written.
+        If the file cannot be read or written.
     """
     chosen = catalogue.ladders(methods).values()
     with locked(output):
@@ -563,11 +652,11 @@ def run_bench(
 
 @dataclass(frozen=True, kw_only=True)
 class BenchTask(Task):
-    """Curves of one scene on their way to a worker process, which times them together.
+    """Time the curves of one scene together, in a worker process.
 
     Attributes
     ----------
-    curves, places : the curves, and where the rows of each begin.
+    curves, places : the curves, and the location of the first row of each.
     repeats, budget_s : timed runs of a point at most, and time for all of them in s.
     """
 
@@ -577,6 +666,7 @@ class BenchTask(Task):
     budget_s: float
 
     def perform(self) -> Rows:
+        """Time all points of the curves, and return their rows, curve after curve."""
         assert self.reference is not None
         scene, reference = bench_inputs(self.curves[0].scene, self.reference)
         core = last_core()  # to which this process is bound, see `measured`
@@ -588,10 +678,12 @@ class BenchTask(Task):
         return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
     def store(self, rows: Rows) -> None:
+        """Write the rows of each curve to their place in the file."""
         for part, place in zip(self.parts(rows), self.places, strict=True):
             place.write(part)
 
     def split(self) -> list[BenchTask]:
+        """Return a task for each curve; an empty list if there is only one."""
         if len(self.curves) == 1:
             return []
         pairs = zip(self.curves, self.places, strict=True)
@@ -612,7 +704,15 @@ class BenchTask(Task):
 def bench_task(
     file: TableFile, curves: Sequence[Curve], repeats: int, budget_s: float
 ) -> BenchTask:
-    """Return the task that measures curves of one scene, see `BenchTask`."""
+    """Return the task that measures curves of one scene, see `BenchTask`.
+
+    Parameters
+    ----------
+    file : the results file, which has a row for each point.
+    curves : at least one, all of the same scene.
+    repeats, budget_s : timed runs of a point at most, and s for all of them; a process that takes
+        several times as long is ended.
+    """
     scene = curves[0].scene.name
     places = [curve.places(file)[0] for curve in curves]
     return BenchTask(
@@ -629,7 +729,14 @@ def bench_task(
 
 
 def measured(task: BenchTask) -> Iterator[RunOutcome]:
-    """Perform a task in a process on one core; yield the outcome of each of its curves."""
+    """Perform a task in a process on one core, and yield the outcome of each of its curves.
+
+    Where the process of a task died, its curves are reported as not stored.
+
+    Parameters
+    ----------
+    task : curves of one scene.
+    """
     with WorkerPool(1, core=last_core()) as pool:
         for end in run_tasks(pool, [task]):
             if end.value is None:
@@ -658,7 +765,12 @@ def rows_of_curve(
 ) -> Rows:
     """Return the rows of a curve, with its order of convergence, or the step for its target.
 
-    facts: columns that all its points have in common.
+    Parameters
+    ----------
+    place : location of the first row of the curve.
+    curve : its target decides whether a step is looked for or an order is fitted.
+    points : columns of each point, by name.
+    facts : columns that all its points have in common.
     """
     facts = {**facts, "repeatable": int(all(point.get("same", True) for point in points))}
     each = [
@@ -680,8 +792,13 @@ def rows_of_curve(
 
 
 def facts_of(short: Scene, reference: Trajectory) -> dict[str, Any]:
-    """What all points of a scene have in common; the uncertainty over the samples that errors are
-    taken at."""
+    """Return the columns that all points of a benched scene have in common.
+
+    Parameters
+    ----------
+    short : the scene as it is benched.
+    reference : its reference at the same samples; the uncertainty is taken up to its horizon.
+    """
     uncertainty = reference.angle_uncertainty
     compared = max(horizon_samples(reference), 1)
     return {

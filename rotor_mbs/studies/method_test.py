@@ -89,8 +89,10 @@ def five_blades() -> Scene:
 
 
 def leaning_blades() -> Scene:
-    """Return the same rotor with a tilted shaft, a cone of each blade of its own, and a hub that
-    loads feel."""
+    """Return the rotor of `five_blades` with a tilted shaft, a different cone of each blade, and a hub.
+
+    The radius and mass of the hub are felt by the loads.
+    """
     scene = five_blades()
     blades = tuple(replace(blade, cone=0.3 - 0.15 * i) for i, blade in enumerate(scene.blades))
     return replace(
@@ -125,8 +127,18 @@ NOT_FOUND = "cause not found"
 
 
 def _run(task: tuple[str, Scene, Mapping[str, object], int, float]) -> Solution:
-    """In a worker process: (method, scene, settings, integrations, time limit in s). Without
-    samples, and why, where the engine raises something."""
+    """Solve a run in a worker process; an error of the engine is returned as its status.
+
+    Parameters
+    ----------
+    task : (method, scene, settings, number of integrations, time limit in s).
+
+    Returns
+    -------
+    Solution
+        Without samples, with the reason as its message, where the method refuses the scene, is
+        stopped at the limit without samples, or raises something.
+    """
     name, scene, settings, repeats, time_limit_s = task
     try:
         with np.errstate(all="ignore"):
@@ -145,13 +157,30 @@ def _run(task: tuple[str, Scene, Mapping[str, object], int, float]) -> Solution:
 
 @caller_signals()
 def examine(name: str, timeout_s: float = 60.0) -> list[Check]:
-    """The checks of a method, each with the most likely reason where it fails. Raises InputError
-    for an unknown one."""
+    """Return the checks of a method, each with the most likely reason where it fails.
+
+    Parameters
+    ----------
+    name : name of the method.
+    timeout_s : time limit of a run in s.
+
+    Raises
+    ------
+    InputError
+        If the method is unknown.
+    """
     with WorkerPool(1) as pool:
         return _Examination(find_method(name), pool, timeout_s).checks()
 
 
 class _Examination:
+    """Collect the checks of one method; its runs are made in the worker process of a pool.
+
+    Parameters
+    ----------
+    method, pool : the method, and the pool that runs it.
+    timeout_s : time limit of a run in s.
+    """
     def __init__(self, method: Method, pool: TaskPool, timeout_s: float) -> None:
         self._method, self._pool, self._timeout_s = method, pool, timeout_s
         self._bounds = bounds_of(method.name).with_entries(method.bounds)
@@ -162,6 +191,10 @@ class _Examination:
         self._has_faults_in_time: bool | None = None
 
     def checks(self) -> list[Check]:
+        """Make all runs, and return the checks in the order in which they are made.
+
+        A first short run is not judged: in it an engine may compile its code.
+        """
         self._ask(
             replace(only_scene(_SMOOTH), duration=0.02, samples=2, outputs=("angles", "rates")),
             limit=_FIRST_S,
@@ -196,6 +229,14 @@ class _Examination:
     def _add(
         self, check: str, scene: str, value: float, bound: float, hint: str, unit: str = ""
     ) -> bool:
+        """Add a check to the list, and return whether it is passed.
+
+        Parameters
+        ----------
+        check, scene : names of the check and of the scene.
+        value, bound, unit : a value above the bound fails.
+        hint : the reason of a failure.
+        """
         made = Check(check, Where(scene, self._method.name, check), float(value), bound, hint, unit)
         self._made.append(made)
         return made.passed
@@ -208,8 +249,16 @@ class _Examination:
         repeats: int = 1,
         limit: float = 0.0,
     ) -> Solution:
-        """A run, not judged; its status is "" where it came back, else a reason why it has no
-        samples."""
+        """Return a run of the method that is not judged.
+
+        Its status is "" if it has samples, else the reason why it has none.
+
+        Parameters
+        ----------
+        scene, settings : what is run; settings that are not named keep their defaults.
+        repeats : number of integrations.
+        limit : s, of one integration; 0 for the limit of the examination.
+        """
         name, settings, limit = (
             self._method.name,
             settings or {},
@@ -225,6 +274,16 @@ class _Examination:
         return without_samples(scene, name, settings, status, message)
 
     def _scene(self, scene: Scene, allowance: float) -> None:
+        """Add the checks of one scene: refusal or samples, determinism, then those of `run_checks`.
+
+        Of several checks with the same name only the one furthest beyond its bound is added. The
+        hint of a check is the probable cause, as far as the checks before it allow one to be named.
+
+        Parameters
+        ----------
+        scene : without loads it is tried again where the method refuses it.
+        allowance : factor by which bounds on defects, energy and loads are multiplied.
+        """
         solution = self._ask(scene)
         if solution.status == REFUSED:  # perhaps because of the loads, which a method need not have
             without_loads = replace(
@@ -297,8 +356,13 @@ class _Examination:
     def _cause(self, scene: Scene, run: Trajectory, defects: Defects) -> str:
         """Return why the defects of a run are too large.
 
-        It is asked for its step, and for other equations or numbers; what none of these explains
-        may be faults at a time, or a scheme of lower order.
+        First the step is halved; then other equations and numbers are tried. What none of these
+        explains may be faults at a time, or a scheme of lower order.
+
+        Parameters
+        ----------
+        scene, run : the scene, and the samples of its run.
+        defects : of the run, of which at least one is beyond its bound.
         """
         left, order = self._with_half_step(scene, run, defects)
         claimed = self._method.order or 1.0
@@ -336,10 +400,15 @@ class _Examination:
     def _with_half_step(
         self, scene: Scene, run: Trajectory, defects: Defects
     ) -> tuple[float, float]:
-        """Return the largest judged defect with half the step, rad, and the order by which the
-        defects shrink.
+        """Return the largest judged defect (rad) with half the step, and the order of the defects.
 
-        Both are zero for a method without a step.
+        The order is the logarithm to base 2 of the ratio of both root mean squares. Both numbers
+        are zero for a method without a step, and where the run with half the step is incomplete.
+
+        Parameters
+        ----------
+        scene, run : the scene, and the samples of its run with the default step.
+        defects : of that run.
         """
         step = self._method.defaults.get("step")
         if not isinstance(step, float):
@@ -352,6 +421,7 @@ class _Examination:
         return float(half.judged_sizes.max()), float(np.log2(ratio))
 
     def _exact(self, scene: Scene) -> None:
+        """Add a check of the rotor angle against the exact solution of a scene, if it has one."""
         known = exact_rotor_angle(scene, sample_times(scene))
         solution = self._ask(scene)
         if known is None or solution.status == REFUSED:
@@ -365,8 +435,11 @@ class _Examination:
         self._add("exact", scene.name, error, bound, fault or f"{name}, solved analytically", "rad")
 
     def _symmetries(self, scene: Scene) -> None:
-        """Of a rotor whose blades are alike and symmetric: its mirror image, and its blades by
-        other numbers."""
+        """Check that mirrored and renumbered initial states give the same motion, transformed.
+
+        The blades of `scene` are equal and symmetric. The mirror image turns the signs of all
+        pitches; blade 1 is renumbered to 2, and so on, with the rotor turned back by one blade.
+        """
         (rotor, *pitches), (spin, *rates), blades = (
             scene.initial_angles,
             scene.initial_rates,
@@ -407,6 +480,11 @@ class _Examination:
             self._add(check, scene.name, error, bound, fault or hints[check], "rad")
 
     def _order(self, scene: Scene) -> None:
+        """Check that the order of convergence of the defects is the one that the method claims.
+
+        Nothing is added for a method without a ladder of steps or a claimed order, or where no
+        order can be fitted.
+        """
         ladder = next((one for one in self._method.ladders if one.kind == STEP), None)
         if ladder is None or self._method.order is None:
             return
@@ -423,7 +501,7 @@ class _Examination:
             self._add("order", scene.name, max(claimed - order, 0.0), _ORDER_BAND, hint, "below")
 
     def _stops(self, scene: Scene) -> None:
-        """A run that would take long is to end at its time limit, by itself."""
+        """Check that a run that would take long ends by itself at its time limit."""
         long = replace(
             scene, duration=_LONG * scene.duration, samples=int(_LONG) * (scene.samples - 1) + 1
         )
@@ -433,7 +511,13 @@ class _Examination:
 
 
 def _wrong_output(scene: Scene, run: Trajectory, check: Check) -> str:
-    """Return what tips, energies or loads are in place of those at the run's own states."""
+    """Return what tips, energies or loads are in place of those at the run's own states.
+
+    Parameters
+    ----------
+    scene, run : the scene, and the samples of its run.
+    check : a failed check named "tip", "energies" or "loads"; its channel says which array.
+    """
     channel = check.where.channel
     if check.name == "tip":
         return wrong_tip(scene, run) or f"not where the angles put it; {NOT_FOUND}"
@@ -452,7 +536,11 @@ def _wrong_output(scene: Scene, run: Trajectory, check: Check) -> str:
 
 
 def protocol_fault(solution: Solution) -> str:
-    """What is wrong with the form of a run that claims to be complete; "" where nothing is."""
+    """Return what is wrong with the form of a run that claims to be complete; "" if nothing is.
+
+    The rows must be finite, as many as the scene has samples, at its sample times, and with
+    unwrapped angles.
+    """
     scene, run, integration = solution.scene, solution.trajectory, solution.integration
     if solution.status == "solver_failed":  # without samples
         return f"{NOT_FOUND}; the run raised an error: {solution.message}"

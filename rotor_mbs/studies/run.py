@@ -54,19 +54,35 @@ _FIXED_WORK = 3.0  # building, judging, storing
 
 @dataclass(frozen=True, kw_only=True)
 class RunTask(Task):
-    """A run on its way to a worker process, which ends itself after `time_limit_s`."""
+    """Solve and judge one run, in a worker process.
+
+    Attributes
+    ----------
+    asked : the run.
+    time_limit_s : s, after which the run ends itself.
+    """
 
     asked: RunRequest
     time_limit_s: float
 
     def failed(self, status: str, message: str) -> Rows:
+        """Return the row of the run without samples, with a status and its reason."""
         asked = self.asked
         run = without_samples(asked.scene, asked.method, asked.settings, status, message)
         limit = self.time_limit_s if status == "timed_out" else np.nan
         return row_of_run(run, self.place, {"false_success": 0, "time_limit_s": limit})
 
     def perform(self) -> Rows:
-        """Solve and judge one run; its row."""
+        """Solve and judge the run, and return its row.
+
+        A shipped reference is read in place of being computed. What a method raises becomes the
+        status of the run.
+
+        Raises
+        ------
+        MethodRefusal
+            If the method cannot represent the scene.
+        """
         asked, end = self.asked, time.monotonic() + self.time_limit_s
         shipped = frozen_solution(asked.scene) if asked.is_shipped else None
         try:
@@ -96,6 +112,7 @@ class RunTask(Task):
         )
 
     def outcome(self, rows: Rows) -> RunOutcome:
+        """Return the outcome that is stored in the row of the run."""
         seconds = float("nan") if self.asked.is_shipped else float(rows["run_time_s"][0])
         status, message = STATUSES[int(rows["status"][0])], text_of(rows["message"][0])
         return RunOutcome(
@@ -109,22 +126,26 @@ class RunTask(Task):
 
 
 def work_of(scene: Scene, method: str) -> float:
-    """Roughly how much there is to compute: 1 is 10 s of a scene by the fastest method."""
+    """Return a rough measure of how much there is to compute, to share runs among processes.
+
+    The integration of 10 s of a scene by the fastest method counts as 1.
+    """
     return _FIXED_WORK + find_method(method).relative_cost * scene.duration / 10.0
 
 
 @dataclass(frozen=True)
 class BatchReport:
-    """The outcomes of a list of runs: of those that this call computed, and of those that were
-    stored already."""
+    """Hold the outcomes of a list of runs: those that this call computed, and those already stored."""
 
     computed: list[RunOutcome]
     stored: list[RunOutcome]
 
     @property
     def failures(self) -> list[RunOutcome]:
-        """Runs that should have succeeded and did not. How far the printed equations get is data,
-        not a failure."""
+        """Return the runs that should have succeeded and did not.
+
+        How far the printed equations get is data, not a failure.
+        """
         return [
             run
             for run in self.computed
@@ -133,7 +154,7 @@ class BatchReport:
 
     @property
     def stored_failures(self) -> list[str]:
-        """A line for each run that was stored already, should have succeeded and did not."""
+        """Return a line for each run that was stored already, should have succeeded and did not."""
         return [
             f"{run.label} {run.status}: {run.message}"
             for run in self.stored
@@ -142,8 +163,10 @@ class BatchReport:
 
     @property
     def not_computed(self) -> list[RunOutcome]:
-        """Runs whose process died or could not start; nothing is stored, the same call tries them
-        again."""
+        """Return the runs whose process died or could not start.
+
+        Nothing is stored of them; the same call tries them again.
+        """
         return [run for run in self.computed if not run.is_stored]
 
 
@@ -159,21 +182,23 @@ def run_scenes(
     use_frozen: bool = True,
     on_progress: OnProgress = ignore_progress,
 ) -> BatchReport:
-    """Compute every scene's reference and runs into the results file `output`; what it has already
-    is kept.
+    """Compute references and runs into a results file; what it has already is kept.
 
     Parameters
     ----------
-    methods : by scene name.
+    scenes : the scenes.
+    methods : names of methods by scene name.
+    output : the results file.
     workers : parallel processes, or a pool that is open; 0: all in this process.
-    timeout_s : a run over this ends itself, and is stored with the status timed_out.
+    timeout_s : s; a run over this ends itself, and is stored with the status timed_out.
     settings : of the methods that have them, in place of defaults and of the scene's own.
     use_frozen : whether a shipped reference may stand for a computed one.
+    on_progress : called after each run.
 
     Raises
     ------
     InputError, StoreError, KeyboardInterrupt
-        The same call then goes on where it stopped.
+        The same call then continues where it stopped.
     """
     asked = asked_runs(scenes, methods, settings or {}, use_frozen=use_frozen)
     with locked(output), pool_of(workers) as pool:
@@ -189,8 +214,23 @@ def asked_runs(
     *,
     use_frozen: bool = True,
 ) -> list[RunRequest]:
-    """Return the rows of these scenes by their `methods`, the reference of each scene first: the
-    shipped one, where there is one and it may be used, or one to be computed. Raises InputError."""
+    """Return the runs of these scenes, the reference of each scene before its runs.
+
+    The reference is the shipped one, where there is one and it may be used, else one to be
+    computed.
+
+    Parameters
+    ----------
+    scenes : the scenes.
+    methods : names of methods by scene name.
+    settings : of the methods that have them, in place of defaults and of the scene's own.
+    use_frozen : whether a shipped reference may be used.
+
+    Raises
+    ------
+    InputError
+        For unknown methods and settings.
+    """
     of_call = settings_for(
         list(dict.fromkeys(name for scene in scenes for name in methods[scene.name])), settings
     )
@@ -211,7 +251,7 @@ def asked_runs(
 def missing_runs(
     file: TableFile, asked: Sequence[RunRequest], timeout_s: float
 ) -> tuple[list[RunTask], list[RunOutcome]]:
-    """Decide which runs are computed, and mark their rows in the file as missing.
+    """Return which runs are to be computed, and mark their rows in the file as missing.
 
     Parameters
     ----------
@@ -221,9 +261,11 @@ def missing_runs(
 
     Returns
     -------
-    tasks : of the runs that are not stored, that a shorter time limit ended, or whose reference is
+    tasks : list of RunTask
+        Of the runs that are not stored, that a shorter time limit ended, or whose reference is
         computed.
-    stored : outcomes of the others, which stay as they are.
+    stored : list of RunOutcome
+        Of the other runs, which stay as they are.
     """
     tasks: list[RunTask] = []
     stored: list[RunOutcome] = []
@@ -276,12 +318,26 @@ def solve_judged(
     compute_reference: bool = False,
     time_limit_s: float = float("inf"),
 ) -> tuple[Solution, Trajectory | None]:
-    """Solve one run in this process, with status, message and metrics, and the reference it was
-    judged by; stores nothing.
+    """Solve and judge one run in this process; nothing is stored.
 
     The time limit is for the run, then the reference, then the judging.
 
-    Arguments, errors raised and an example: `rotor_mbs.run`.
+    Parameters
+    ----------
+    scene, method, settings : what is run.
+    compute_reference : whether a reference is computed where none is shipped.
+    time_limit_s : s.
+
+    Returns
+    -------
+    Solution
+        The run, with status, message and metrics.
+    Trajectory or None
+        The reference it was judged by.
+
+    Notes
+    -----
+    Errors raised and an example: `rotor_mbs.run`.
     """
     end = time.monotonic() + time_limit_s
     shipped, is_short = frozen_solution(scene), False
@@ -308,11 +364,14 @@ def solve_judged(
 
 
 def _judged(run: Solution, reference: Trajectory | None, end: float) -> tuple[Solution, bool]:
-    """The run with status, message and metrics; and whether its engine claims a success that it is
-    not.
+    """Return a run with status, message and metrics, and whether its report of success is false.
 
-    What was reached by the time limit, which is at `end` of the monotonic clock, is judged in a
-    second more.
+    Parameters
+    ----------
+    run : a run as its method returned it.
+    reference : of its scene; None without one.
+    end : time limit on the monotonic clock, s. What was reached by then is judged in one second
+        more.
     """
     try:
         with time_limit(max(end - time.monotonic(), _JUDGING_S)):
@@ -337,8 +396,10 @@ def _judged(run: Solution, reference: Trajectory | None, end: float) -> tuple[So
 
 
 def _with_defects(samples: Trajectory, defects: Defects) -> Trajectory:
-    """Return the samples with the size of each interval's defect at its end; NaN where it is not
-    known."""
+    """Return the samples with the size of each interval's defect at its end.
+
+    It is NaN at the first sample, and where the defect is not finite.
+    """
     sizes = np.concatenate([[np.nan], defects.sizes])
     known = samples.replace(**{DEFECT: np.where(np.isfinite(sizes), sizes, np.nan)})
     known.refined = samples.refined
@@ -346,8 +407,17 @@ def _with_defects(samples: Trajectory, defects: Defects) -> Trajectory:
 
 
 def next_to_try(scene: Scene, method: str, settings: Mapping[str, object], status: str) -> str:
-    """What would make an inaccurate run better: the next rung of the method's ladder, or another
-    method; else "". Of a reference, which nothing else can stand for, ""."""
+    """Return a text on what would improve an inaccurate run; "" if nothing is known.
+
+    That is the next rung of the method's ladder, or another method. Nothing is proposed for a
+    reference, which no other method can replace.
+
+    Parameters
+    ----------
+    scene : its sample interval is the coarsest step.
+    method, settings : of the run.
+    status : of the run; only "inaccurate" gives a proposal.
+    """
     known = find_method_or_none(method)
     if status != "inaccurate" or known is None or not known.is_corrected or method == REFERENCE:
         return ""
@@ -361,6 +431,13 @@ def next_to_try(scene: Scene, method: str, settings: Mapping[str, object], statu
 def without_samples(
     scene: Scene, method: str, settings: Mapping[str, object], status: str, message: str
 ) -> Solution:
+    """Return a run without samples, whose engine reports failure.
+
+    Parameters
+    ----------
+    scene, method, settings : what was to be run.
+    status, message : the outcome and its reason.
+    """
     columns = 1 + len(scene.blades)
     trajectory = Trajectory(np.empty(0), np.empty((0, columns)), np.empty((0, columns)))
     chosen = find_method(method).settings.of(method, settings).as_dict()

@@ -26,11 +26,18 @@ from rotor_mbs.solution.trajectory import Integration, Solution, Trajectory
 
 
 def shipped_files() -> list[Path]:
+    """Return the paths of the shipped files of references, sorted."""
     return sorted(REFERENCES.glob("*.h5"))
 
 
 class ShippedReference(NamedTuple):
-    """Where the shipped reference of a scene is, and what computed it."""
+    """Locate the shipped reference of a scene.
+
+    Attributes
+    ----------
+    path, scene : the file, and the name of the scene in it.
+    frozen_with : versions of what computed it.
+    """
 
     path: Path
     scene: str
@@ -38,12 +45,13 @@ class ShippedReference(NamedTuple):
 
 
 def shipped_reference(scene_hash: str) -> ShippedReference | None:
-    """The shipped reference of the scene of that hash; None where there is none."""
+    """Return the shipped reference of the scene with this hash; None if there is none."""
     return _shipped_by_hash(tuple(shipped_files())).get(scene_hash)
 
 
 @functools.cache
 def _shipped_by_hash(files: tuple[Path, ...]) -> dict[str, ShippedReference]:
+    """Return the references in these files, by the hash of their scene."""
     by_hash: dict[str, ShippedReference] = {}
     for path in files:
         for known in TableFile(path, [RUNS]).tables[RUNS].known_rows.values():
@@ -53,8 +61,10 @@ def _shipped_by_hash(files: tuple[Path, ...]) -> dict[str, ShippedReference]:
 
 
 def shipped_versions(scene_hash: str) -> dict[str, str] | None:
-    """`versions` of a row with the shipped reference of the scene of that hash; None where there is
-    none."""
+    """Return the `versions` of a row with the shipped reference of the scene with this hash.
+
+    None is returned where there is no such reference.
+    """
     shipped = shipped_reference(scene_hash)
     if shipped is None:
         return None
@@ -64,12 +74,12 @@ def shipped_versions(scene_hash: str) -> dict[str, str] | None:
 
 @functools.cache
 def _digest(path: Path) -> str:
-    """SHA-256 of a file, in hexadecimal."""
+    """Return the SHA-256 of a file, in hexadecimal."""
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 def read_reference(place: RowLocation, scene: Scene) -> Trajectory | None:
-    """The reference of `scene` at a place of a results file; None where it is missing or empty."""
+    """Return the reference of `scene` at a place of a results file; None if missing or empty."""
     row = place.read()
     samples = int(row["samples"][0])
     if int(row["status"][0]) == MISSING or samples <= 0:
@@ -79,8 +89,15 @@ def read_reference(place: RowLocation, scene: Scene) -> Trajectory | None:
 
 
 def rebuilt_reference(scene: Scene, arrays: Mapping[str, NDArray[Any]]) -> Trajectory:
-    """A stored reference with what its scene asks for, computed from its angles and rates by its
-    own closed form. arrays: time and `REFERENCE_ARRAYS`, by name, as far as they are stored."""
+    """Return a stored reference with the other quantities that its scene requests.
+
+    They are computed from its angles and rates by the closed form.
+
+    Parameters
+    ----------
+    scene : the scene of the reference.
+    arrays : time and `REFERENCE_ARRAYS`, by name, as far as they are stored.
+    """
     from rotor_mbs.models.lagrange import samples
 
     known = {name: values for name, values in arrays.items() if not np.isnan(values[:1]).all()}
@@ -92,15 +109,28 @@ def rebuilt_reference(scene: Scene, arrays: Mapping[str, NDArray[Any]]) -> Traje
 
 
 def frozen_solution(scene: Scene) -> Solution | None:
-    """Return the shipped reference of a scene, with the settings and times of when it was computed;
-    None where there is none. Its arrays are shared by all callers, and read-only. Raises StoreError
-    where it cannot be read."""
+    """Return the shipped reference of a scene; None if there is none.
+
+    It has the settings and times of when it was computed. Its arrays are shared by all callers, and
+    read-only.
+
+    Raises
+    ------
+    StoreError
+        If it cannot be read.
+    """
     shipped = shipped_reference(scene_hash(scene))
     return None if shipped is None else _read_shipped(shipped, scene)
 
 
 @functools.lru_cache(maxsize=32)
 def _read_shipped(shipped: ShippedReference, scene: Scene) -> Solution:
+    """Read a shipped reference, and make its arrays read-only.
+
+    Parameters
+    ----------
+    shipped, scene : location of the reference, and the scene that it is of.
+    """
     with open_results(shipped.path, only=[shipped.scene]) as results:
         stored = results.scenes[shipped.scene].reference
         assert stored is not None  # a file of references has one for each scene

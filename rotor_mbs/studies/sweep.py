@@ -58,8 +58,17 @@ _GRACE_S = 5.0  # in which a run that ends itself at its limit stores what it re
 
 @dataclass(frozen=True, kw_only=True)
 class Chunk(Task):
-    """Runs by one method; values: (runs, keys) the varied numbers; code: of the versions that
-    compute them, stored with each; with_defects: of runs side by side, too."""
+    """Compute runs of a sweep by one method, in a worker process.
+
+    Attributes
+    ----------
+    values : (runs, keys) varied numbers.
+    variants : builds the scene of a run from its row of `values`.
+    settings : of the method.
+    time_limit_s : s, of each run.
+    code : number of the versions that compute the runs, stored with each.
+    with_defects : whether runs that are computed side by side are checked by their defects, too.
+    """
 
     values: NDArray[np.float64]
     variants: Variants
@@ -114,17 +123,19 @@ class Chunk(Task):
         return rows
 
     def split(self) -> list[Chunk]:
-        """Its runs one by one; [] where it is one run."""
+        """Return its runs as single chunks; an empty list if it is one run."""
         return (
             [self.part(i, i + 1) for i in range(len(self.values))] if len(self.values) > 1 else []
         )
 
     def part(self, start: int, end: int) -> Chunk:
+        """Return the chunk of its runs `start` <= i < `end`."""
         values = self.values[start:end]
         kill_after_s = limit_of(len(values), self.time_limit_s)
         return replace(self, place=self.place.at(start), values=values, kill_after_s=kill_after_s)
 
     def failed(self, status: str, message: str) -> Rows:
+        """Return rows of its runs with a status and its reason, in place of computed values."""
         limit = self.time_limit_s if status == "timed_out" else np.nan
         values = {
             "status": status,
@@ -137,12 +148,22 @@ class Chunk(Task):
 
 
 def limit_of(runs: int, time_limit_s: float) -> float:
-    """When the worker of so many runs is ended: a method may compute them one after the other."""
+    """Return the time in s after which the worker process of a number of runs is ended.
+
+    It is `time_limit_s` for each of the `runs`, as a method may compute them one after the other,
+    and a while to store them.
+    """
     return time_limit_s * runs + _GRACE_S
 
 
 def _judged_row(chunk: Chunk, run: Solution) -> Rows:
-    """Raises OutOfTimeError where judging takes longer than the time limit."""
+    """Return the row of a run, judged within the time limit of its chunk.
+
+    Raises
+    ------
+    OutOfTimeError
+        If judging takes longer than the time limit.
+    """
     with time_limit(chunk.time_limit_s):
         judgement = judge(run.scene, run, None)
     judged = replace(
@@ -155,8 +176,12 @@ def _judged_row(chunk: Chunk, run: Solution) -> Rows:
 
 
 def _extremes(angles: Array, rates: Array) -> dict[str, Array]:
-    """(runs,) the largest angle and rate of the rotor, and the largest magnitude of any pitch
-    angle."""
+    """Return the largest angle and rate of the rotor, and pitch angle, of each run, by name.
+
+    Parameters
+    ----------
+    angles, rates : (runs, samples, 1 + blades) rad and rad/s, rotor first.
+    """
     return {
         "rotor_angle_max": largest(angles[:, :, 0]),
         "rotor_rate_max": largest(rates[:, :, 0]),
@@ -165,6 +190,16 @@ def _extremes(angles: Array, rates: Array) -> dict[str, Array]:
 
 
 def _side_by_side(chunk: Chunk, scenes: Sequence[Scene]) -> Rows:
+    """Compute all runs of a chunk at once by `Method.solve_many`, and return their rows.
+
+    Runs that are clearly ok by their energy (and defects, if asked for) get that status; only the
+    others are judged in full, one by one.
+
+    Parameters
+    ----------
+    chunk : runs by a method that has `solve_many`.
+    scenes : the scene of each run.
+    """
     method = find_method(chunk.method)
     assert method.solve_many is not None
     settings = method.settings.of(chunk.method, chunk.settings)
@@ -241,9 +276,18 @@ OnProgress = Callable[[int, int, Counter[str]], None]
 
 @dataclass(frozen=True)
 class SweepPlan:
-    """The runs first <= r < last of a sweep, by its methods; run r is row r mod rows of the design,
-    by method r div rows. settings: by method, those of the sweep that it has. refused: the methods
-    that were left out."""
+    """Hold the runs first <= r < last of a sweep, by its methods.
+
+    Run r is row r mod `rows` of the design, by method number r div `rows`.
+
+    Attributes
+    ----------
+    sweep, methods : the sweep, and the names of the methods that can represent its base scene.
+    settings : for each method, those of the sweep that it has.
+    first, last : numbers of runs.
+    time_limit_s : s, of each run.
+    refused : the methods that were left out.
+    """
 
     sweep: Sweep
     methods: tuple[str, ...]
@@ -255,19 +299,34 @@ class SweepPlan:
 
     @property
     def runs(self) -> int:
+        """Return the number of runs of the plan."""
         return self.last - self.first
 
     @property
     def rows(self) -> int:
+        """Return the number of rows of the design, which each method computes."""
         return self.sweep.design.count
 
     def table(self) -> TableSpec:
+        """Return the specification of the table of its runs."""
         return sweep_table(self.sweep, self.methods, range(self.first, self.last))
 
     def chunks(
         self, place: RowLocation, gaps: Sequence[tuple[int, int]], workers: int = 1
     ) -> Iterator[Chunk]:
-        """Cut the runs of `gaps` into what one of `workers` does at once, by one method."""
+        """Yield the runs of `gaps` as chunks, each by one method.
+
+        Parameters
+        ----------
+        place : location of the plan's first run in the file.
+        gaps : (first, last) numbers of runs that are missing, `last` not included.
+        workers : number of processes among which the runs are shared.
+
+        Raises
+        ------
+        TableError
+            If the first row of the first gap makes no scene.
+        """
         variants, design = self.sweep.variants(), self.sweep.design
         for first, _ in gaps[:1]:
             variants.scene(design.rows(first, first + 1)[0].tolist())
@@ -299,6 +358,10 @@ class SweepPlan:
                 first, left = end, left - (end - first)
 
     def attributes(self) -> dict[str, object]:
+        """Return the attributes of the sweep's file, by name.
+
+        The digest under IDENTITY covers everything that decides which runs the file holds.
+        """
         sweep, table = self.sweep, self.sweep.design
         options = [
             table.combine,
@@ -351,7 +414,7 @@ def plan_sweep(
 
     Parameters
     ----------
-    sweep : the sweep.
+    sweep : as read from its file.
     methods : names; those of the sweep's file if there are none.
     part : (k, n) for part k of n.
     time_limit_s : time limit of a run in s.
@@ -378,13 +441,21 @@ def plan_sweep(
 
 @dataclass(frozen=True)
 class SweepResult:
-    """A sweep that is complete, but for runs that were lost.
+    """Hold the outcome of a sweep that is complete, except for runs that were lost or refused.
 
-    runs, made: in the dataset, and by this call. is_ok: whether every run is ok whose method claims
-    the correct equations, and none is refused. older: how many stored runs other versions computed.
-    lost: a line for each run whose process died or could not start, also when it was tried alone:
-    not stored. refused: a line for each method and reason, of runs that are not stored because the
-    method cannot represent them.
+    Attributes
+    ----------
+    path : the dataset.
+    runs, made : number of runs of the plan, and of those computed by this call.
+    statuses : number of runs in the dataset with each status.
+    seconds : s, taken by this call.
+    is_ok : whether no method was refused, and every run is ok whose method claims the correct
+        equations.
+    lost : a line for each run whose process died or could not start, also when it was tried alone;
+        it is not stored.
+    older : number of stored runs that other versions computed.
+    refused : a line for each method and reason; runs that the method cannot represent are not
+        stored.
     """
 
     path: Path
@@ -407,13 +478,22 @@ def run_sweep(
     *,
     fresh: bool = False,
 ) -> SweepResult:
-    """Compute the runs that `output` misses. However it is interrupted, the same call continues
-    from there.
+    """Compute the runs that `output` lacks; an interrupted call can be repeated and continues.
 
-    on_progress: called when runs have been stored, first with those that were there. fresh: whether
-    runs that are stored are computed again. Raises InputError, MethodRefusal where the sweep cannot
-    be done, or the output is another file; StoreError where it cannot be written: what was stored
-    stays.
+    Parameters
+    ----------
+    plan : the runs.
+    output : the dataset.
+    pool : worker processes.
+    on_progress : called when runs have been stored, first with those that were there.
+    fresh : whether runs that are stored are computed again.
+
+    Raises
+    ------
+    InputError, MethodRefusal
+        If the sweep cannot be done, or `output` is a different file.
+    StoreError
+        If `output` cannot be written; what was stored stays.
     """
     start = time.monotonic()
     opened = open_sweep(output, plan.table(), plan.attributes(), plan.time_limit_s, fresh=fresh)
@@ -471,4 +551,5 @@ def run_sweep(
 
 
 def _counted(statuses: NDArray[np.int8]) -> Counter[str]:
+    """Return the number of runs with each status, without missing ones."""
     return Counter(STATUSES[code] for code in statuses.tolist() if code != MISSING)

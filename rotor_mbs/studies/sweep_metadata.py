@@ -37,8 +37,13 @@ _TEMPLATES = jinja2.Environment(
 
 
 def describe(path: Path | str) -> Path:
-    """Write the Croissant file beside the dataset at `path`; its path. Raises StoreError where it
-    is no sweep's."""
+    """Write the Croissant file beside the dataset at `path`, and return its path.
+
+    Raises
+    ------
+    StoreError
+        If `path` is not a sweep's dataset.
+    """
     path = Path(path)
     place, stored = path.with_suffix(".croissant.json"), StoredSweep(path)
     columns = _of_runs(stored)
@@ -54,13 +59,12 @@ def describe(path: Path | str) -> Path:
 
 
 def write_splits(path: Path | str, folder: Path) -> list[Path]:
-    """Write the dataset at `path` as a folder that `datasets.load_dataset(folder)` of Hugging Face
-    reads.
+    """Write a dataset as a folder for `datasets.load_dataset(folder)` of Hugging Face.
 
-    That reader takes each variable of an HDF5 file for a column, and wants one number of rows in
-    all of them: each split is a file of its own, without the scales but the time, which is repeated
-    in every row. Runs that are missing are left out; those that failed have their status. A split
-    is held in memory while it is written.
+    That reader takes each variable of an HDF5 file as a column, and needs the same number of rows
+    in all of them: each split is a file of its own, without the scales except the time, which is
+    repeated in every row. Runs that are missing are left out; those that failed have their status.
+    A split is held in memory while it is written.
 
     Parameters
     ----------
@@ -70,12 +74,13 @@ def write_splits(path: Path | str, folder: Path) -> list[Path]:
 
     Returns
     -------
-    The files: one for each split that has runs, "train.h5" where runs are not marked, and the card.
+    list of Path
+        A file for each split that has runs, "train.h5" where runs are not marked, then the card.
 
     Raises
     ------
     StoreError, InputError
-        Where `path` is no sweep's dataset, or a file cannot be written, or is not an earlier
+        If `path` is not a sweep's dataset, or a file cannot be written, or is not an earlier
         output.
     """
     stored = StoredSweep(Path(path))
@@ -116,7 +121,7 @@ def write_splits(path: Path | str, folder: Path) -> list[Path]:
 
 
 def _of_runs(stored: StoredSweep) -> dict[str, Column]:
-    """The variables with a value for each run."""
+    """Return the variables with a value for each run, by name."""
     return {
         name: column for name, column in stored.columns.items() if column.dimensions[0] == "run"
     }
