@@ -13,8 +13,13 @@ from rotor_mbs.solution.trajectory import Array
 
 
 def tip_paths(scene: Scene, angles: Array) -> Array:
-    """Return the paths of the tips in the base frame, (n, blades, 3) m, at angles (n, 1 + blades)
-    rad."""
+    """Return the paths of the tips in the base frame, (n, blades, 3) m.
+
+    Parameters
+    ----------
+    scene : tilt, cones and tips of its blades are used.
+    angles : (n, 1 + blades) rad, rotor first.
+    """
     return np.stack(
         [_rotated(_frames(scene, angles, i), blade.tip) for i, blade in enumerate(scene.blades)],
         axis=1,
@@ -22,8 +27,15 @@ def tip_paths(scene: Scene, angles: Array) -> Array:
 
 
 def kinetic_energy(scene: Scene, angles: Array, rates: Array) -> Array:
-    """Return ½ m v² + ½ ω·I ω of every blade, v = ω × r and ω = q̇2 e_shaft + θ̇ e_z(blade), and of
-    the hub: (n,) J."""
+    """Return the kinetic energy of the blades and the hub, (n,) J.
+
+    That of a blade is ½ m v² + ½ ω·I ω with v = ω × r and ω = q̇2 e_shaft + θ̇ e_z(blade).
+
+    Parameters
+    ----------
+    scene : masses, centres of mass and inertias of its blades are used.
+    angles, rates : (n, 1 + blades) rad and rad/s, rotor first.
+    """
     total = 0.5 * scene.hub_inertia * rates[:, 0] ** 2
     for i, blade in enumerate(scene.blades):
         frames = _frames(scene, angles, i)
@@ -46,10 +58,15 @@ def kinetic_energy(scene: Scene, angles: Array, rates: Array) -> Array:
 
 
 def potential_energy(scene: Scene, time: Array, angles: Array) -> Array:
-    """Return the energy of weights, zero at the apex's height, and of bearing springs (a pitch
-    that cannot move has none): (n,) J.
+    """Return the potential energy of weights and bearing springs, (n,) J.
 
-    time (n,) s, for rest angles that move
+    That of weights is zero at the apex's height. A pitch that cannot move has no spring.
+
+    Parameters
+    ----------
+    scene : gravity, blades and bearings are used.
+    time : (n,) s, for rest angles that change.
+    angles : (n, 1 + blades) rad, rotor first.
     """
     total = np.zeros(len(angles))
     for i, blade in enumerate(scene.blades):
@@ -65,8 +82,10 @@ def potential_energy(scene: Scene, time: Array, angles: Array) -> Array:
 
 
 def work_of_constant_loads(scene: Scene, angles: Array) -> Array | None:
-    """Return the work of the loads, (n,) J; None where a load changes or there is damping: there
-    the work is no function of the angles."""
+    """Return the work of the loads, (n,) J; None where it is no function of the angles.
+
+    That is where a load changes, or there is damping.
+    """
     if scene.has_damping or not scene.has_constant_loads:
         return None
     torques = [scene.torque_at(0.0), *(value_at(torque, 0.0) for torque, _ in scene.pitch_loads)]
@@ -74,8 +93,16 @@ def work_of_constant_loads(scene: Scene, angles: Array) -> Array | None:
 
 
 def _frames(scene: Scene, angles: Array, blade: int) -> Array:
-    """Return Rx(tilt) Ry(q2 + phase) Rx(-cone) Rz(θ), (n, 3, 3): columns are the blade's axes in
-    the base frame."""
+    """Return Rx(tilt) Ry(q2 + phase) Rx(-cone) Rz(θ), (n, 3, 3), of a blade.
+
+    The columns are the blade's axes in the base frame.
+
+    Parameters
+    ----------
+    scene : its tilt, and phase and cone of the blade, are used.
+    angles : (n, 1 + blades) rad, rotor first.
+    blade : number of the blade, from 0.
+    """
     azimuth, pitch = angles[:, 0] + scene.phases[blade], angles[:, 1 + blade]
     s, c, sp, cp = np.sin(azimuth), np.cos(azimuth), np.sin(pitch), np.cos(pitch)
     zero = np.zeros_like(s)
@@ -100,13 +127,25 @@ def _rotated(frames: Array, point: tuple[float, float, float]) -> Array:
 
 
 def exact_rotor_angle(scene: Scene, time: Array) -> tuple[str, Array] | None:
-    """Return the name of an exact solution and the rotor's angle by it, (n,) rad, where every pitch
-    stays at zero; None where none is known.
+    """Return the name of an exact solution and the rotor's angle by it; None if none is known.
 
-    One blade let go at rest: a pendulum (elliptic functions; Abramowitz & Stegun 22.2). Equal
-    blades in balance: gravity cancels, a constant torque gives q0 + Ω0 t + τ t² / (2 I). On a
-    tilted shaft gravity turns the pitches of blades whose centre of mass is off the pitch axis, and
-    a cone those that have a moment of inertia about it.
+    It is known where every pitch stays at zero. One blade let go at rest: a pendulum (elliptic
+    functions; Abramowitz & Stegun 22.2). Equal blades in balance: gravity cancels, a constant
+    torque gives q0 + Ω0 t + τ t² / (2 I). On a tilted shaft gravity turns the pitches of blades
+    whose centre of mass is off the pitch axis, and a cone those that have a moment of inertia about
+    it.
+
+    Parameters
+    ----------
+    scene : the scene.
+    time : (n,) s.
+
+    Returns
+    -------
+    str
+        "pendulum", "constant torque", "uniform rotation" or "rest".
+    ndarray
+        (n,) rad.
     """
     # Zero pitch is invariant for blades that their own x-z plane mirrors; nothing may damp the
     # rotor.
@@ -138,15 +177,24 @@ def exact_rotor_angle(scene: Scene, time: Array) -> tuple[str, Array] | None:
 
 
 def _inertia_at_zero_pitch(blade: Blade) -> float:
-    """Return a blade's inertia about the shaft, kg m²: about its own y axis, or that of a rod leant
-    by its cone."""
+    """Return a blade's inertia about the shaft, kg m².
+
+    It is that about its own y axis, or that of a rod inclined by its cone.
+    """
     yy: float = blade.inertia_about_apex()[1]
     return yy * math.cos(blade.cone) ** 2 if blade.cone else yy
 
 
 def _pendulum(scene: Scene, time: Array) -> tuple[str, Array] | None:
-    """Return "pendulum" and its angle by elliptic functions, (n,) rad; None for a rotor that is
-    none, or is driven."""
+    """Return "pendulum" and its angle by elliptic functions, (n,) rad.
+
+    None is returned for a rotor that is driven, turns at the start, or has no restoring moment.
+
+    Parameters
+    ----------
+    scene : of one blade.
+    time : (n,) s.
+    """
     from scipy.special import ellipj, ellipk
 
     blade = scene.blades[0]

@@ -39,11 +39,13 @@ GROWTH = 1e-5
 
 @dataclass(frozen=True)
 class ModeSet:
-    """n modes: of one speed, or of several, whose number then comes first in every array.
+    """Hold n modes of one speed, or of several, whose number then comes first in every array.
 
-    eigenvalues (..., n, 2) 1/s: both of each mode, conjugate where it oscillates
-    shapes      (..., n, n): a row for each mode, rotor and pitch amplitudes, the largest one 1
-    names       of the modes where symmetry tells them apart, else ()
+    Attributes
+    ----------
+    eigenvalues : (..., n, 2) 1/s, both of each mode, conjugate where it oscillates.
+    shapes : (..., n, n), a row for each mode: rotor and pitch amplitudes, the largest one 1.
+    names : of the modes where symmetry distinguishes them, else ().
     """
 
     eigenvalues: Complex
@@ -52,20 +54,24 @@ class ModeSet:
 
     @property
     def undamped_frequencies(self) -> Array:
-        """(..., n) rad/s: root of the product of both eigenvalues; NaN where one of them grows
-        without oscillating."""
+        """Return the undamped frequencies, (..., n) rad/s: root of the product of both eigenvalues.
+
+        NaN where one of them grows without oscillating.
+        """
         product = (self.eigenvalues[..., 0] * self.eigenvalues[..., 1]).real
         return np.sqrt(np.where(product >= 0.0, np.abs(product), np.nan))
 
     @property
     def damped_frequencies(self) -> Array:
-        """(..., n) rad/s: 0 where the mode does not oscillate."""
+        """Return the damped frequencies, (..., n) rad/s; 0 where the mode does not oscillate."""
         return np.asarray(np.abs(self.eigenvalues[..., 0].imag))
 
     @property
     def damping_ratios(self) -> Array:
-        """(..., n) damping ratio, above 1 if overdamped; NaN where the undamped frequency is 0 or
-        none."""
+        """Return the damping ratios, (..., n), above 1 if overdamped.
+
+        NaN where the undamped frequency is 0 or NaN.
+        """
         frequencies = self.undamped_frequencies
         rate = -0.5 * self._real_parts.sum(axis=-1)
         ratios = np.divide(
@@ -75,13 +81,15 @@ class ModeSet:
 
     @property
     def growth_rates(self) -> Array:
-        """(..., n) 1/s: the larger real part of each mode; above 0 it is unstable."""
+        """Return the larger real part of each mode, (..., n) 1/s; above 0 it is unstable."""
         return np.asarray(self._real_parts.max(axis=-1) + 0.0)
 
     @property
     def _real_parts(self) -> Array:
-        """(..., n, 2) 1/s: 0 where they are below the precision of the eigenvalue, as -1e-100
-        beside 1 rad/s."""
+        """Return the real parts of the eigenvalues, (..., n, 2) 1/s.
+
+        They are 0 where they are below the precision of the eigenvalue, as -1e-100 beside 1 rad/s.
+        """
         is_rounding = np.abs(self.eigenvalues.real) <= np.finfo(float).eps * np.abs(
             self.eigenvalues
         )
@@ -89,12 +97,16 @@ class ModeSet:
 
 
 def multiblade(blades: int) -> tuple[tuple[str, ...], Array]:
-    """Return the names of the multiblade (Coleman) coordinates, and the (blades, blades) matrix
-    from them to the blades' pitches.
+    """Return the names of the multiblade (Coleman) coordinates, and their matrix.
 
-    Pitch of blade i = collective + Σ_k (cosine_k cos k ψ_i + sine_k sin k ψ_i) [+ differential
+    The matrix, (blades, blades), gives the blades' pitches from these coordinates:
+    pitch of blade i = collective + Σ_k (cosine_k cos k ψ_i + sine_k sin k ψ_i) [+ differential
     (-1)^(i-1)], with the blade's mounting angle ψ_i = 2π(i-1)/blades. Source: R. P. Coleman, A. M.
     Feingold, NACA Report 1351, 1958.
+
+    Parameters
+    ----------
+    blades : number of blades; the differential coordinate exists if it is even.
     """
     psi = 2.0 * np.pi * np.arange(blades) / blades
     names, columns = ["collective"], [np.ones(blades)]
@@ -109,8 +121,10 @@ def multiblade(blades: int) -> tuple[tuple[str, ...], Array]:
 
 
 def multiblade_shapes(shapes: Complex) -> Complex:
-    """(..., 1 + blades) amplitudes of rotor and multiblade coordinates, from those of rotor and
-    pitches."""
+    """Return amplitudes of rotor and multiblade coordinates, (..., 1 + blades).
+
+    They are computed from `shapes`, the amplitudes of rotor and pitches, (..., 1 + blades).
+    """
     _, matrix = multiblade(shapes.shape[-1] - 1)
     pitches = np.einsum("cb,...b->...c", np.linalg.inv(matrix), shapes[..., 1:])
     return np.concatenate([shapes[..., :1], pitches], axis=-1)
@@ -180,11 +194,14 @@ def modes_of(
 
 
 def isotropic_modes(stiffness: Array, damping: Array) -> ModeSet:
-    """Return the modes of a rotor of equal blades without gravity: rotor, then one for each
-    multiblade coordinate, by name.
+    """Return the modes of a rotor of equal blades without gravity, with their names.
 
-    Multiblade coordinates split the equations exactly: rotor and collective pitch, and each of the
-    others alone.
+    The rotor comes first, then one mode for each multiblade coordinate. These coordinates split the
+    equations exactly: rotor and collective pitch together, and each of the others alone.
+
+    Parameters
+    ----------
+    stiffness, damping : (1 + blades, 1 + blades), 1/s² and 1/s, rotor first, then the pitches.
     """
     names, matrix = multiblade(len(stiffness) - 1)
     n = len(stiffness)
@@ -213,8 +230,10 @@ def isotropic_modes(stiffness: Array, damping: Array) -> ModeSet:
 
 
 def track(sets: Sequence[ModeSet]) -> list[ModeSet]:
-    """Put the same modes in the same places at every speed: each set is put in the order of the one
-    before."""
+    """Put the same modes in the same places at every speed.
+
+    Each set is put in the order of the one before it.
+    """
     out = list(sets[:1])
     for each in sets[1:]:
         out.append(in_order_of(out[-1], each))
@@ -226,6 +245,10 @@ def in_order_of(first: ModeSet, other: ModeSet) -> ModeSet:
 
     Likeness of two modes: the modal assurance criterion |φ·ψ*|² / (|φ|² |ψ|²), less their relative
     distance.
+
+    Parameters
+    ----------
+    first, other : sets of the same number of modes, each of one speed.
     """
     from scipy.optimize import linear_sum_assignment
 
@@ -241,20 +264,28 @@ def in_order_of(first: ModeSet, other: ModeSet) -> ModeSet:
 def whirl_frequencies(
     frequency: Array, speed: Array, harmonic: Array | int = 1
 ) -> tuple[Array, Array]:
-    """Return backward and forward whirl in rad/s, as the base sees a cosine and sine mode of
-    `frequency` in the rotor."""
+    """Return the backward and forward whirl frequencies in rad/s, as the base sees them.
+
+    They are those of a cosine and sine mode of `frequency` in the rotor's frame, at rotor speed
+    `speed` (both rad/s); `harmonic` is the number k of the coordinates cosine_k and sine_k.
+    """
     return np.abs(frequency - harmonic * speed), frequency + harmonic * speed
 
 
 def floquet(
     transition: Array, flow: Array, gradient: Array, speed: float
 ) -> tuple[Complex, Complex]:
-    """Return multipliers of a (2n, 2n) state transition matrix over a turn, the largest first: all
-    of them, and the others than those that are 1 for every such motion. It is stable where none of
-    the latter is larger than 1, up to `GROWTH`.
+    """Return the multipliers of a turn: all, and those that are not 1 in every such motion.
 
-    flow: (2n,) time derivative of the state, an eigenvector for 1. gradient: (2n,) derivative of
-    what the motion keeps, a left eigenvector for 1, or zeros.
+    Both are sorted, the largest modulus first. The motion is stable where none of the latter is
+    larger than 1, up to `GROWTH`.
+
+    Parameters
+    ----------
+    transition : (2n, 2n) state transition matrix over the turn.
+    flow : (2n,) time derivative of the state, an eigenvector for 1.
+    gradient : (2n,) derivative of what the motion keeps, a left eigenvector for 1, or zeros.
+    speed : rad/s, scale of the rates.
     """
     if not np.isfinite(transition).all():
         nothing = np.full(len(transition), complex(np.nan, np.nan))
@@ -271,6 +302,7 @@ def floquet(
 
 
 def _normalized(shape: Complex | Array) -> Complex:
+    """Return a shape divided by its largest entry; a shape of zeros stays."""
     largest = shape[int(np.argmax(np.abs(shape)))]
     return np.asarray(shape / largest if largest != 0.0 else shape, dtype=complex)
 
@@ -301,13 +333,21 @@ _NO_FORCE = 1e-10
 
 @dataclass(frozen=True, kw_only=True)
 class LinearModes(ModeSet):
-    """The modes of one source over speed, the same mode in the same place at every speed.
+    """Hold the modes of one source over speed, the same mode in the same place at every speed.
 
-    names: "collective pitch" where symmetry tells the modes apart, else "mode 2". kind: REST or
-    ROTATION. angles: (speeds, n) rad, steady values of the `coordinates` that move. stiffness,
-    damping: (speeds, n, n), the mass matrix divided out. weights: 1/s², moments of all weights
-    about the shaft divided by the inertia, of which the stiffness of a balanced rotor is rounding.
-    messages: why there is nothing at a speed, or "".
+    Attributes
+    ----------
+    names : "collective pitch" where symmetry distinguishes the modes, else "mode 2".
+    source, label : name of the model, and its label for readers.
+    kind : REST or ROTATION.
+    blades : number of blades.
+    speeds : (speeds,) rad/s.
+    coordinates : names of the n coordinates that move.
+    angles : (speeds, n) rad, steady values of the `coordinates`.
+    stiffness, damping : (speeds, n, n) 1/s² and 1/s, the mass matrix divided out.
+    weights : 1/s², moments of all weights about the shaft divided by the inertia, of which the
+        stiffness of a balanced rotor is rounding.
+    messages : for each speed why there are no modes, or "".
     """
 
     source: str
@@ -324,11 +364,11 @@ class LinearModes(ModeSet):
 
     @property
     def residual(self) -> float:
-        """Largest residual of (λ² + λ damping + stiffness) φ = 0 over all modes, divided by the
-        size of its terms.
+        """Return the largest residual of (λ² + λ damping + stiffness) φ = 0 over all modes.
 
-        The modes of equal blades are computed as if no blade differed, and those without gravity as
-        if nothing depended on the rotor's angle: matrices for which that is false have a residual.
+        It is divided by the size of the terms. The modes of equal blades are computed as if no
+        blade differed, and those without gravity as if nothing depended on the rotor's angle:
+        matrices for which that is false have a residual.
         """
         largest = 0.0
         for i in range(len(self.speeds)):
@@ -341,15 +381,16 @@ class LinearModes(ModeSet):
         return largest
 
     def residual_of(self, i: int, value: complex, shape: Complex) -> float:
-        """Return the residual of one eigenvalue (1/s) with a shape (n,) at speed number i, see
-        `residual`."""
+        """Return the residual of an eigenvalue (1/s) with a shape (n,) at speed number i, see `residual`."""
         stiffness, damping = self.stiffness[i], self.damping[i]
         force = value * value * shape + value * (damping @ shape) + stiffness @ shape
         return float(np.linalg.norm(force) / (np.linalg.norm(shape) * self._terms(i, value)))
 
     def shapes_of(self, i: int, value: complex) -> Complex:
-        """Return all shapes of an eigenvalue (1/s) at speed number i, one in each row, from the
-        whole matrices."""
+        """Return all shapes of an eigenvalue (1/s) at speed number i, one in each row.
+
+        They are computed from the whole matrices.
+        """
         n = len(self.coordinates)
         _, sizes, vectors = np.linalg.svd(
             value * value * np.eye(n) + value * self.damping[i] + self.stiffness[i]
@@ -366,7 +407,7 @@ class LinearModes(ModeSet):
 
     @property
     def multiblade_shapes(self) -> Complex:
-        """(speeds, n, 1 + blades): by speed, mode, and rotor or multiblade coordinate."""
+        """Return the shapes by rotor and multiblade coordinate, (speeds, n, 1 + blades)."""
         whole = np.zeros((len(self.speeds), len(self.coordinates), 1 + self.blades), dtype=complex)
         columns = [
             0 if name == "rotor" else int(name.rpartition(" ")[2]) for name in self.coordinates
@@ -376,7 +417,10 @@ class LinearModes(ModeSet):
 
     @property
     def whirl(self) -> tuple[Array, Array]:
-        """(speeds, n) rad/s backward and forward whirl of cosine and sine modes; NaN for others."""
+        """Return backward and forward whirl frequencies of cosine and sine modes, (speeds, n) rad/s.
+
+        NaN for other modes.
+        """
         harmonics = np.full(len(self.names), np.nan)
         for k, name in enumerate(self.names):
             if name.startswith(("cosine", "sine")):  # "cosine pitch", "cosine 2 pitch"
@@ -386,12 +430,19 @@ class LinearModes(ModeSet):
 
 @dataclass(frozen=True)
 class FloquetTable:
-    """Multipliers (speeds, 2n) of a turn under gravity over speed; largest: modulus of those that
-    are not always 1.
+    """Hold the Floquet multipliers of a turn under gravity over speed.
 
-    stable: 1, 0, or -1 where no periodic motion was found. product_error: logarithm of their
-    product less the integrated trace; NaN where rounding hides it. torque: N m on the rotor;
-    mismatch: rad that a turn misses.
+    Attributes
+    ----------
+    speeds : (speeds,) rad/s.
+    multipliers : (speeds, 2n).
+    largest : (speeds,) modulus of the largest one that is not always 1.
+    stable : (speeds,) 1, 0, or -1 where no periodic motion was found.
+    product_error : (speeds,) logarithm of their product less the integrated trace; NaN where
+        rounding hides it.
+    torque : (speeds,) N m on the rotor.
+    mismatch : (speeds,) rad by which a turn is not periodic.
+    messages : for each speed why there is no motion, or "".
     """
 
     speeds: Array
@@ -405,17 +456,22 @@ class FloquetTable:
 
     @property
     def growth_rates(self) -> Array:
-        """(speeds,) 1/s."""
+        """Return the growth rate that follows from the largest multiplier, (speeds,) 1/s."""
         with np.errstate(divide="ignore"):
             return np.asarray(np.log(self.largest) * self.speeds / (2.0 * np.pi))
 
 
 @dataclass(frozen=True)
 class SceneModes:
-    """The modes of a scene by model, the closed form first; `notes` has the reason for missing
-    results.
+    """Hold the modes of a scene by model, the closed form first.
 
-    label: the scene's name, with what was changed in a shipped one.
+    Attributes
+    ----------
+    scene, scene_hash, title, blades, gravity : of the scene; gravity in m/s².
+    rest, rotation : modes at rest under gravity, and in steady rotation without gravity, by model.
+    floquet : multipliers of a turn under gravity; None where there are none.
+    notes : reasons for missing results.
+    label : the scene's name, with what was changed in a shipped one.
     """
 
     scene: str
@@ -431,11 +487,12 @@ class SceneModes:
 
     @property
     def disagreement(self) -> float:
-        """Largest difference of two models; 0 for one model.
+        """Return the largest difference of two models; 0 for one model.
 
-        That of a mode's larger eigenvalue in modulus, or of the mean real part, divided by the
-        largest eigenvalue; of eigenvalues below a thousandth of the largest one the residual of the
-        closed form's mode in the other model's equations, see `LinearModes.residual`.
+        It is that of a mode's larger eigenvalue in modulus, or of the mean real part, divided by
+        the largest eigenvalue. Of eigenvalues below a thousandth of the largest one it is the
+        residual of the closed form's mode in the other model's equations, see
+        `LinearModes.residual`.
         """
         largest = 0.0
         for kind in (self.rest, self.rotation):
@@ -446,7 +503,7 @@ class SceneModes:
 
     @property
     def residuals(self) -> dict[str, float]:
-        """By model, the largest residual of its modes in its own equations."""
+        """Return the largest residual of each model's modes in its own equations."""
         residuals: dict[str, float] = {}
         for kind in (self.rest, self.rotation):
             for model, source in kind.items():
@@ -455,13 +512,15 @@ class SceneModes:
 
     @property
     def agrees(self) -> bool:
-        """Whether the models agree, and each one's modes satisfy its own equations."""
+        """Return whether the models agree, and each one's modes satisfy its own equations."""
         return self.disagreement <= AGREEMENT and not self.faults
 
     @property
     def faults(self) -> list[str]:
-        """A line for each model whose modes do not satisfy its own equations to the printed
-        digits."""
+        """Return a line for each model whose modes do not satisfy its own equations as printed.
+
+        The residual may be at most PRINTED_PRECISION.
+        """
         lines = []
         for model, residual in self.residuals.items():
             if not residual <= PRINTED_PRECISION:
@@ -472,12 +531,18 @@ class SceneModes:
 
     @property
     def closed_form(self) -> list[LinearModes]:
-        """Modes of the closed form at rest and over speed, as far as they were computed."""
+        """Return the modes of the closed form at rest and over speed, as far as they were computed."""
         return [next(iter(kind.values())) for kind in (self.rest, self.rotation) if kind]
 
 
 def _difference(first: LinearModes, other: LinearModes) -> float:
-    """Return the difference of two sources of one state, see `SceneModes.disagreement`."""
+    """Return the difference of two sources of one state, see `SceneModes.disagreement`.
+
+    Parameters
+    ----------
+    first, other : sources with the same speeds and modes; slow modes of `first` are put into the
+        equations of `other`.
+    """
     sizes = np.abs(first.eigenvalues)  # (speeds, modes, 2)
     top = float(np.nanmax(sizes, initial=0.0))
     numbers = []
@@ -504,8 +569,14 @@ def _difference(first: LinearModes, other: LinearModes) -> float:
 
 
 def mode_rows(modes: SceneModes) -> list[dict[str, object]]:
-    """Return a row for each state, speed and mode of the closed form: speeds and frequencies in
-    rad/s, growth in 1/s."""
+    """Return a row for each state, speed and mode of the closed form.
+
+    Speeds and frequencies are in rad/s, growth in 1/s; a number that does not exist is None.
+
+    Parameters
+    ----------
+    modes : modes of a scene.
+    """
     rows: list[dict[str, object]] = []
     for linear in modes.closed_form:
         numbers = {
@@ -527,7 +598,12 @@ def mode_rows(modes: SceneModes) -> list[dict[str, object]]:
 
 
 def mode_table(rows: Sequence[Mapping[str, object]]) -> TextTable:
-    """Return a table of such rows, damped frequencies in Hz too."""
+    """Return a table of rows of `mode_rows`, with damped frequencies in Hz, too.
+
+    Parameters
+    ----------
+    rows : speeds and frequencies in rad/s, growth in 1/s.
+    """
     head = (
         "state",
         "speed (rad/s)",
@@ -555,8 +631,14 @@ def mode_table(rows: Sequence[Mapping[str, object]]) -> TextTable:
 
 @np.errstate(all="ignore")
 def mode_summary(modes: SceneModes) -> str:
-    """Return modes at rest and at the lowest and highest speed, stability, and whether models
-    agree, as text."""
+    """Return the modes of a scene as text: numbers, stability, and whether models agree.
+
+    The modes are those at rest and at the lowest and highest speed.
+
+    Parameters
+    ----------
+    modes : modes of a scene.
+    """
     rows = mode_rows(modes)
     ends = {
         linear.speeds[place] for linear in list(modes.rotation.values())[:1] for place in (0, -1)
@@ -595,6 +677,12 @@ _SPEED = Column(("speed",), "rad/s", "rotor speed")
 
 
 def _linear_datasets(linear: LinearModes) -> Datasets:
+    """Return the arrays of one source with their descriptions, as a results file has them.
+
+    Parameters
+    ----------
+    linear : modes of one source and kind over speed.
+    """
     mode, shape = partial(Column, ("speed", "mode")), linear.multiblade_shapes
     component = Column(("component",), "1", "rotor and multiblade coordinates")
     n, (backward, forward) = np.arange(len(linear.coordinates)), linear.whirl
@@ -664,7 +752,12 @@ def _linear_datasets(linear: LinearModes) -> Datasets:
 
 
 def to_records(modes: SceneModes) -> list[Record]:
-    """Return the records of a file of modes."""
+    """Return the records of a file of modes: one for each model and kind, and the multipliers.
+
+    Parameters
+    ----------
+    modes : modes of a scene.
+    """
     common = {name: getattr(modes, name) for name in ("scene_hash", "title", "blades", "gravity")}
     common |= {"notes": "\n".join(modes.notes), "scene_label": modes.label}
     linear = [*modes.rest.values(), *modes.rotation.values()]
@@ -721,6 +814,14 @@ def _record(scene: str, name: str, attributes: Mapping[str, Any], datasets: Data
 
 
 def _linear_record(scene: str, linear: LinearModes, common: Mapping[str, Any]) -> Record:
+    """Return the record of one source.
+
+    Parameters
+    ----------
+    scene : name of the scene.
+    linear : modes of the source.
+    common : attributes that all records of the scene have.
+    """
     attributes = {
         **common,
         "label": linear.label,
@@ -735,8 +836,18 @@ def _linear_record(scene: str, linear: LinearModes, common: Mapping[str, Any]) -
 
 
 def linear_dataset(sources: Mapping[str, LinearModes], xarray: Any) -> Any:
-    """Return all sources of one state as an xarray.Dataset with the dimension `solver`; `xarray` is
-    the module."""
+    """Return all sources of one state as an xarray.Dataset with the dimension `solver`.
+
+    Parameters
+    ----------
+    sources : modes by model.
+    xarray : the module.
+
+    Raises
+    ------
+    InputError
+        If there is no source.
+    """
     if not sources:
         raise InputError("no modes of this state; allowed: a state that was computed")
     sets = []
@@ -758,8 +869,13 @@ def linear_dataset(sources: Mapping[str, LinearModes], xarray: Any) -> Any:
 
 
 def read_modes(path: Path) -> dict[str, SceneModes]:
-    """Read all modes in a file, by scene. Raises StoreError where the file cannot be read or has
-    none."""
+    """Read all modes in a file, by scene.
+
+    Raises
+    ------
+    StoreError
+        If the file cannot be read or has no modes.
+    """
     records = read_records(path, "modes")
     if not records:
         raise StoreError(
@@ -770,6 +886,12 @@ def read_modes(path: Path) -> dict[str, SceneModes]:
 
 
 def _modes_of(of_all: Sequence[Record]) -> dict[str, SceneModes]:
+    """Return the modes that records of a file hold, by scene, the closed form first.
+
+    Parameters
+    ----------
+    of_all : records of all scenes, as `to_records` makes them.
+    """
     by_scene: dict[str, dict[str, Record]] = {}
     for record in of_all:
         by_scene.setdefault(record.scene, {})[record.name] = record

@@ -53,11 +53,22 @@ _SHRINK = 10.0  # times by which a margin may be smaller than in an earlier file
 
 
 def check_file(path: Path, bounds: Bounds, required: Sequence[str] = ()) -> list[Check]:
-    """Check what is stored, and whether every scene, or the sweep, has a run of each required
-    method.
+    """Check what is stored in a file, and that each required method has run.
 
-    Raises InputError where there is no run of a method, as in a bench file or a file of references;
-    StoreError.
+    Every scene of a results file, or the sweep, must have a run of each of these methods.
+
+    Parameters
+    ----------
+    path : a results file or a sweep.
+    bounds : bounds of all checks.
+    required : names of methods, or method files.
+
+    Raises
+    ------
+    InputError
+        If there is no run of a method, as in a bench file or a file of references.
+    StoreError
+        If the file cannot be read.
     """
     checks = judge_file(path, bounds)
     if all(check.passed and check.where.method == REFERENCE for check in checks):
@@ -86,10 +97,18 @@ def check_default_set(
     on_progress: OnProgress = ignore_progress,
     methods: Sequence[str] = (),
 ) -> list[Check]:
-    """Compute the default set, and check it.
+    """Compute the default set of runs in a temporary file, and return their checks.
 
-    It is every scene of the paper by the default methods; the scenes made for checking by every
-    method; or all by the `methods` that are named, where they can represent them.
+    The set is every scene of the paper by the default methods, and the scenes made for checking by
+    every corrected method; or all of these scenes by the `methods` that are named, where they can
+    represent them.
+
+    Parameters
+    ----------
+    bounds : bounds of all checks.
+    workers : parallel processes.
+    on_progress : called after each run.
+    methods : names; by default those described above.
     """
     paper, own = (find_scenes([folder]) for folder in _DEFAULT_SCENES)
     corrected = [name for name in method_names(is_corrected=True) if find_method(name).is_installed]
@@ -117,12 +136,26 @@ def check_default_set(
 
 
 def _required(scene: str, method: str, hint: str, *, is_missing: bool = True) -> Check:
+    """Return the check that a scene has a run of a required method; it fails if that is missing."""
     return Check("required", Where(scene, method, "run"), float(is_missing), 0.0, hint, "missing")
 
 
 def judge_file(path: Path, bounds: Bounds) -> list[Check]:
-    """Check what is there, runs or a sweep; [] where nothing can be judged. Raises StoreError,
-    InputError."""
+    """Return the checks of the runs, or the sweep, in a file; an empty list if it has neither.
+
+    Of a sweep only completeness and integrity are checked: its runs were judged when they were
+    computed.
+
+    Parameters
+    ----------
+    path : a results file or a sweep.
+    bounds : bounds of all checks.
+
+    Raises
+    ------
+    InputError, StoreError
+        If a stored scene is not valid, or the file cannot be read.
+    """
     writer = (
         "; another process is writing it, or was killed while it did"
         if is_being_written(path)
@@ -167,8 +200,14 @@ def judge_file(path: Path, bounds: Bounds) -> list[Check]:
 
 
 def runs_gone(path: Path, earlier: Path) -> Check:
-    """Check that the sweep at `path` has every run of an earlier one: its method with the same
-    varied numbers."""
+    """Check that the sweep at `path` has every run of an earlier one.
+
+    A run is found by its method and its varied numbers.
+
+    Parameters
+    ----------
+    path, earlier : the sweep that is checked, and the earlier one.
+    """
     new, old = (StoredSweep(place, allow_damaged_runs=True) for place in (path, earlier))
     methods = [*old.methods, *new.methods]
 
@@ -188,10 +227,16 @@ def runs_gone(path: Path, earlier: Path) -> Check:
 
 
 def scenes_checked(path: Path | None) -> dict[str, Scene]:
-    """Return the scenes of a file by name, of a sweep the one that is varied; without a file those
-    of the default set.
+    """Return the scenes of a file by name; of a sweep the one that is varied.
 
-    Raises StoreError, and InputError where a stored scene is none.
+    Without a file they are those of the default set.
+
+    Raises
+    ------
+    InputError
+        If a stored scene is not valid.
+    StoreError
+        If the file cannot be read.
     """
     if path is None:
         return {scene.name: scene for scene in find_scenes(_DEFAULT_SCENES)}
@@ -210,7 +255,7 @@ def changed_scenes(
     Parameters
     ----------
     new, old : scenes by name.
-    are_allowed : whether scenes may differ; what differs is told all the same.
+    are_allowed : whether scenes may differ; the differences are reported in either case.
     """
     checks = []
     for name in new.keys() & old.keys():
@@ -234,8 +279,10 @@ def changed_scenes(
 
 
 def judged_runs(checks: Iterable[Check]) -> Counter[str]:
-    """Count the runs of each method that were judged, so that whoever reads misses a run that is
-    not there."""
+    """Return the number of runs of each method that were judged.
+
+    With it a reader of the verdict notices a run that is missing.
+    """
     return Counter(
         check.where.method
         for check in checks
@@ -244,12 +291,15 @@ def judged_runs(checks: Iterable[Check]) -> Counter[str]:
 
 
 def regressions(new: Sequence[Check], old: Sequence[Check]) -> list[Check]:
-    """Compare margins: a check "against" for every earlier one, how many times its margin has
-    shrunk, which may be ten.
+    """Return a check for each earlier one: by what factor its margin has shrunk, at most ten.
 
-    A check for every one of `old`, and one for a run that is gone. The value is
-    NaN, which fails, where `new` lacks the check or the run, and infinite where a check that passed
-    fails. What failed before and fails now is no regression.
+    There is also a check for each run that is missing now. The value is NaN, which fails, where
+    `new` lacks the check or the run, and infinite where a check that passed fails. What failed
+    before and fails now is no regression.
+
+    Parameters
+    ----------
+    new, old : checks of this file and of the earlier one.
     """
     present = {(check.name, check.where): check for check in new}
     runs = {check.where[:2] for check in new}

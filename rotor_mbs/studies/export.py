@@ -71,8 +71,13 @@ def export(
 
 
 def reference_csv(scene: Scene) -> str:
-    """Return the scene's reference, shipped or computed, as comma-separated values. StoreError
-    where it does not begin."""
+    """Return the scene's reference, shipped or computed, as comma-separated values.
+
+    Raises
+    ------
+    StoreError
+        If the reference has no samples.
+    """
     solution = frozen_solution(scene) or solve(REFERENCE, scene, {})
     trajectory = solution.trajectory
     if not len(trajectory.time):
@@ -120,8 +125,14 @@ _COMMENTS = {  # by kind; parts of another kind are left out
 
 
 def exudyn_script(scene: Scene) -> str:
-    """Return the kinematic tree with the same step as a Python script for Exudyn alone; its text is
-    a template."""
+    """Return a scene as a Python script for Exudyn alone: its kinematic tree, with a fixed step.
+
+    The text is made from a template. The step is the default of exudyn_tree/rk67.
+
+    Parameters
+    ----------
+    scene : its loads become tables in the script.
+    """
     parts = [part for part in tree.parts(scene, Loads(scene)) if part.kind in _COMMENTS]
     moving = [0, *(1 + i for i in movable_blades(scene))]
     calls = []
@@ -156,6 +167,13 @@ def exudyn_script(scene: Scene) -> str:
 
 
 def _argument(key: str, value: Any) -> str:
+    """Return the value of an argument of an Exudyn item as Python source.
+
+    Parameters
+    ----------
+    key : name of the argument.
+    value : a reference to another item, a function of load terms, or numbers.
+    """
     if isinstance(value, Ref):
         return f"number[{value.kind!r}, {value.name!r}]"
     if callable(value):
@@ -171,8 +189,15 @@ def _argument(key: str, value: Any) -> str:
 
 
 def _value(value: object, indent: int = 4) -> str:
-    """Numbers with all their digits; matrices as arrays, a row of a list on its own line where it
-    is nested; indent: of the line that the value is on."""
+    """Return a value as Python source, numbers with all their digits.
+
+    Matrices become arrays; a nested list has a line for each row.
+
+    Parameters
+    ----------
+    value : a number, a text, an array or a sequence of these.
+    indent : number of blanks before the line that the value begins on.
+    """
     if isinstance(value, np.ndarray):
         return f"np.array({value.tolist()!r})"
     if isinstance(value, np.generic):

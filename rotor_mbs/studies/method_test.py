@@ -89,9 +89,9 @@ def five_blades() -> Scene:
 
 
 def leaning_blades() -> Scene:
-    """Return the rotor of `five_blades` with a tilted shaft, a different cone of each blade, and a hub.
+    """Return the rotor of `five_blades` with a tilted shaft, coned blades and a hub.
 
-    The radius and mass of the hub are felt by the loads.
+    Each blade has a different cone; the radius and mass of the hub matter to the loads.
     """
     scene = five_blades()
     blades = tuple(replace(blade, cone=0.3 - 0.15 * i) for i, blade in enumerate(scene.blades))
@@ -181,6 +181,7 @@ class _Examination:
     method, pool : the method, and the pool that runs it.
     timeout_s : time limit of a run in s.
     """
+
     def __init__(self, method: Method, pool: TaskPool, timeout_s: float) -> None:
         self._method, self._pool, self._timeout_s = method, pool, timeout_s
         self._bounds = bounds_of(method.name).with_entries(method.bounds)

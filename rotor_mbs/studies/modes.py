@@ -57,8 +57,7 @@ def modes_of_scenes(
     timeout_s: float,
     on_progress: OnProgress = ignore_progress,
 ) -> list[RunOutcome]:
-    """Compute the modes of every scene into the file `output`; those that it has of other scenes
-    are kept.
+    """Compute the modes of every scene into a file; those that it has of other scenes are kept.
 
     Parameters
     ----------
@@ -71,8 +70,9 @@ def modes_of_scenes(
     names : sequence of str
         Methods whose models stand beside the closed form; by default all.
     workers : int
+        Parallel processes.
     timeout_s : float
-        Time limit of each scene.
+        Time limit of each scene, s.
     on_progress : callable
         Not called for a scene without modes.
 
@@ -86,6 +86,7 @@ def modes_of_scenes(
     InputError
         For a negative or repeated speed, and for a method that is not linearized.
     StoreError
+        If `output` cannot be written, or is a file of another kind.
     """
     models = tuple(find_method(name).model for name in names)
     for name, model in zip(names, models, strict=True):
@@ -136,15 +137,16 @@ def modes_of_scenes(
 def compute_modes(
     scene: Scene, speeds: Sequence[float] | Array = (), models: Sequence[str] = ()
 ) -> modal.SceneModes:
-    """Compute all modes of a scene.
+    """Return all modes of a scene.
 
-    At rest under gravity; in steady rotation without gravity at `speeds`; Floquet multipliers of a
-    turn under gravity at those above 0. The torque on the rotor is left out: the drive holds its
-    speed. Pitch torques and rest angles are those at t = 0.
+    They are those at rest under gravity, those in steady rotation without gravity at `speeds`, and
+    the Floquet multipliers of a turn under gravity at the speeds above 0. The torque on the rotor
+    is left out: the drive holds its speed. Pitch torques and rest angles are those at t = 0.
 
     Parameters
     ----------
     scene : Scene
+        The scene that is linearized.
     speeds : sequence of float
         rad/s, increasing, at least 0.
     models : sequence of str
@@ -182,8 +184,18 @@ def compute_modes(
 def _linear(
     scene: Scene, kind: str, speeds: Array, models: Sequence[str], notes: list[str]
 ) -> dict[str, modal.LinearModes]:
-    """By model, the closed form first, then `models`, or all; one that cannot do any of the speeds
-    is left out, with a note."""
+    """Return the modes of one kind by model, the closed form first.
+
+    A model that cannot represent one of the speeds is left out; at rest a note says why.
+
+    Parameters
+    ----------
+    scene : with loads that are constant.
+    kind : REST or ROTATION.
+    speeds : (speeds,) rad/s.
+    models : names beside the closed form; all if there are none.
+    notes : list to which reasons for missing results are added.
+    """
     from rotor_mbs.models.lagrange.linearization import is_balanced, weight_stiffness
 
     points = _steady_states(scene, kind, speeds)
@@ -279,8 +291,20 @@ def _linear(
 
 
 def _steady_states(scene: Scene, kind: str, speeds: Array) -> list[_Point | str]:
-    """(scene as it is linearized, angles, speed, torque) at each speed; the reason where there is
-    no such."""
+    """Return the steady state at each speed; a text with the reason where there is none.
+
+    Parameters
+    ----------
+    scene : with its gravity, which is left out in rotation.
+    kind : REST or ROTATION.
+    speeds : (speeds,) rad/s, increasing.
+
+    Returns
+    -------
+    list of tuple or str
+        (scene as it is linearized, angles (1 + blades,) rad, speed in rad/s, torque in N m that
+        holds it).
+    """
     from rotor_mbs.models.lagrange.linearization import equilibrium, holding_torque, steady_rotation
 
     at = scene if kind == modal.REST else replace(scene, gravity=0.0)
@@ -303,8 +327,20 @@ def _steady_states(scene: Scene, kind: str, speeds: Array) -> list[_Point | str]
 
 
 def _floquet_table(scene: Scene, speeds: Array) -> modal.FloquetTable:
-    """Multipliers of the periodic motion under gravity at `speeds` > 0, from the fastest down.
-    Raises MethodRefusal."""
+    """Return the multipliers of the periodic motion under gravity, computed from the fastest down.
+
+    Each turn starts from the motion at the next faster speed, if that was found.
+
+    Parameters
+    ----------
+    scene : with constant loads.
+    speeds : (speeds,) rad/s, increasing, above 0.
+
+    Raises
+    ------
+    MethodRefusal
+        If heyoka is not installed.
+    """
     from rotor_mbs.models.lagrange.floquet import periodic_turn
 
     turns: list[Turn] = []
@@ -333,8 +369,15 @@ def _floquet_table(scene: Scene, speeds: Array) -> modal.FloquetTable:
 
 
 def increasing_speeds(speeds: Sequence[float] | Array) -> list[float]:
-    """Return rotor speeds as floats. Raises InputError where they are not allowed, TypeError for
-    what is no number."""
+    """Return rotor speeds (rad/s) as floats.
+
+    Raises
+    ------
+    InputError
+        If they do not increase, or one is negative or out of range.
+    TypeError
+        If one of `speeds` is not a number.
+    """
     try:
         numbers = [float(speed) for speed in speeds]
     except (ValueError, OverflowError):  # a text, a whole number above 1e308

@@ -43,8 +43,7 @@ _LONGEST_S = 0.25
 def reproduce(
     output: Path, *, workers: Workers, timeout_s: float, on_progress: OnProgress = ignore_progress
 ) -> tuple[BatchReport, list[Refusal]]:
-    """Compute the default set of runs and the curves into a results file; what it has already is
-    kept.
+    """Compute the default set of runs and the curves into a results file; what it has is kept.
 
     Parameters
     ----------
@@ -63,6 +62,7 @@ def reproduce(
     Raises
     ------
     InputError, StoreError
+        The same call then continues where it stopped.
     """
     scenes, benched = find_scenes(["paper"]), find_scenes([BENCHED])[0]
     names = (*default_methods(), *errata_methods().values())
@@ -89,7 +89,15 @@ def reproduce(
 
 
 def made_from(results: Path, timeout_s: float) -> str:
-    """A digest of the results file, code, versions, scenes, references and the time limit."""
+    """Return a digest of a results file and of all that it was made from.
+
+    That is the package's files, versions, scenes, references and the time limit.
+
+    Parameters
+    ----------
+    results : the results file.
+    timeout_s : time limit of a run in s.
+    """
     package = Path(rotor_mbs.__file__).parent
     sources = sorted(
         path for path in package.rglob("*") if path.is_file() and path.parent.name != "__pycache__"
@@ -107,7 +115,7 @@ def made_from(results: Path, timeout_s: float) -> str:
 
 
 def summary_of(path: Path) -> str:
-    """Numbers and claims of the paper, and a line for each method over all its scenes."""
+    """Return the numbers and claims of the paper, and a line for each method, as text."""
     with open_results(path) as results:
         runs = [run for scene in results.scenes.values() for run in scene.methods.values()]
         rows = finding(results.scenes, claims(results.scenes))
@@ -116,7 +124,7 @@ def summary_of(path: Path) -> str:
 
 
 def short_curves(scene: Scene) -> list[Curve]:
-    """A short curve of each method on `scene`."""
+    """Return a short curve of each method that can represent `scene`."""
     able, _ = supporting_methods(
         scene, list(dict.fromkeys(method.name for method, _ in ladders().values()))
     )

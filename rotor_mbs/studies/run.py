@@ -135,7 +135,7 @@ def work_of(scene: Scene, method: str) -> float:
 
 @dataclass(frozen=True)
 class BatchReport:
-    """Hold the outcomes of a list of runs: those that this call computed, and those already stored."""
+    """Hold the outcomes of a list of runs: computed by this call, and stored already."""
 
     computed: list[RunOutcome]
     stored: list[RunOutcome]

@@ -54,9 +54,16 @@ OUTCOMES = {
 
 @dataclass(frozen=True)
 class SuiteRun:
-    """A run of the suite: a scene by a method.
+    """Hold the outcome of a run of the suite: a scene by a method.
 
-    outcome: a key of OUTCOMES. step: s, that 1e-6 rad needs, where a ladder found it.
+    Attributes
+    ----------
+    scene, method : names.
+    status, message : as stored.
+    outcome : a key of OUTCOMES.
+    false_success : whether the engine reported success of a run that is wrong.
+    has_reference : whether the scene has a reference that is ok.
+    step : s, that an error of 1e-6 rad needs; None where no ladder found it.
     """
 
     scene: str
@@ -70,11 +77,18 @@ class SuiteRun:
 
     @property
     def folder(self) -> str:
+        """Return the folder of its scene, such as "stiff"."""
         return self.scene.partition("/")[0]
 
 
 def suite_runs(path: Path) -> list[SuiteRun]:
-    """Return every run of a results file, in its order. Raises StoreError."""
+    """Return every run of a results file, in its order.
+
+    Raises
+    ------
+    StoreError
+        If the file cannot be read.
+    """
     ladders = {(record.scene, record.name): record for record in read_records(path, "stability")}
     runs = []
     with open_results(path) as results:
@@ -101,10 +115,15 @@ def suite_runs(path: Path) -> list[SuiteRun]:
 
 
 def suite_table(runs: Sequence[SuiteRun]) -> TextTable:
-    """Return a row for each method, a column for each folder of scenes: "12+1 of 14" are ok, of
-    these 1 with a smaller step; of the printed equations "2 of 2 completed".
+    """Return a table of the runs that are ok, by method and folder of scenes.
 
-    Without scenes that are singular and have no reference: there no motion exists.
+    A cell "12+1 of 14" says that 13 runs are ok, 1 of them only with a smaller step; of the printed
+    equations it is "2 of 2 completed". Runs that are singular in scenes without a reference are not
+    counted: there no motion exists.
+
+    Parameters
+    ----------
+    runs : of any number of scenes and methods.
     """
     compared = [run for run in runs if run.has_reference or run.status != "singular"]
     folders = list(dict.fromkeys(run.folder for run in compared))
@@ -224,7 +243,19 @@ def complete_ladders(
     workers: Workers,
     on_progress: OnProgress = ignore_progress,
 ) -> list[RunOutcome]:
-    """Complete the ladders of steps of these scenes, where the runs in `output` call for them."""
+    """Complete the ladders of steps of these scenes, where the stored runs need them.
+
+    A ladder is needed for methods with a fixed step, on stiff and light scenes and where the run
+    failed at the default step.
+
+    Parameters
+    ----------
+    scenes : the scenes.
+    methods : names of methods by scene name, whose ladders are replaced.
+    output : the results file, which has the runs.
+    workers : parallel processes, or a pool that is open.
+    on_progress : called after each ladder.
+    """
     by_name = {scene.name: scene for scene in scenes}
     # Where a fixed step may matter: the stiff and light scenes, and runs that failed at the default
     # step.
@@ -252,8 +283,10 @@ def complete_ladders(
 
 
 def ladder_curve(scene: Scene, method: str) -> Curve:
-    """Its steps: the sample interval, then a quarter of the one before, as long as a run has not
-    too many of them."""
+    """Return the curve of a scene and method over steps that become smaller by factors of 4.
+
+    The first step is the sample interval; the last one is limited by the number of steps of a run.
+    """
     steps = [scene.duration / (scene.samples - 1)]
     while scene.duration <= _MAX_STEPS * steps[-1] / _FACTOR:
         steps.append(steps[-1] / _FACTOR)
