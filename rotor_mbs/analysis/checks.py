@@ -60,10 +60,16 @@ _OWN_GROWTH = 0.05
 def checks_of(results: OpenResults, frozen: Sequence[OpenResults], bounds: Bounds) -> list[Check]:
     """Return every check that an open file allows, in the order of its scenes.
 
-    The file is opened with verify=False: a row that has changed is judged, too. frozen: the shipped
-    references.
+    Parameters
+    ----------
+    results : opened with verify=False, so that a row that has changed is judged, too.
+    frozen : the shipped references.
+    bounds : for all scenes; those of methods are added.
 
-    Raises InputError where a stored scene is none.
+    Raises
+    ------
+    InputError
+        If a stored scene is not valid.
     """
     bounds = bounds.with_entries(bound for method in methods() for bound in method.bounds)
     shipped = {name: scene.reference for file in frozen for name, scene in file.scenes.items()}
@@ -116,8 +122,18 @@ def _of_run(
     reference: Trajectory | None,
     motion_ends: bool,
 ) -> Iterator[Check]:
-    """Yield the checks of a run. One that stops early and reports it is complete where the motion
-    ends there."""
+    """Yield the checks of a run.
+
+    One that stops early and reports it is complete where the motion ends there.
+
+    Parameters
+    ----------
+    run, bounds : the stored run, and the bounds of its scene.
+    solution : the run rebuilt from its samples; None where it cannot be.
+    faults : a line for each stored array that is missing or wrong.
+    reference : of the scene; None without one.
+    motion_ends : whether the motion of the scene ends in a singularity.
+    """
     reports_it = solution is not None and run.status not in COMPLETE
     if reports_it and (motion_ends or not is_corrected(run.method)):
         faults = []
@@ -165,11 +181,16 @@ def _of_run(
 
 
 def _of_stored_interval(run: StoredRun, judgement: Judgement) -> Metrics:
-    """Return the numbers of the interval that is stored as the worst, if it is as far beyond its
-    bound as the worst.
+    """Return the numbers of the stored worst interval, if it is as far beyond its bound.
 
-    Which one of several is the worst, the last bits of the samples decide, which other hardware
-    rounds otherwise.
+    Of several nearly equal intervals the last bits of the samples decide which one is the worst,
+    and other hardware rounds them otherwise. Where the stored one is clearly less far beyond its
+    bound than the worst, the result is empty.
+
+    Parameters
+    ----------
+    run : has the end of the interval, defect_time.
+    judgement : of the samples, with their defects.
     """
     defects, metrics = judgement.defects, judgement.metrics
     stored = run.attributes.get("defect_time", math.nan)
@@ -198,8 +219,22 @@ def _rounding(metrics: Metrics) -> float:
 
 
 def _changed_metric(run: StoredRun, metrics: Metrics, solution: Solution) -> tuple[str, float, str]:
-    """Return channel, value and hint of the stored number that is furthest from what the samples
-    give."""
+    """Return the stored number that is furthest from what the samples give.
+
+    Parameters
+    ----------
+    run, metrics : stored numbers, and those computed from the samples.
+    solution : the run rebuilt from its samples.
+
+    Returns
+    -------
+    str
+        Name of the number.
+    float
+        Its relative difference; 0 where all are within rounding.
+    str
+        Both values, as text.
+    """
     trajectory = solution.trajectory
     worst, hint, channel = 0.0, "stored numbers equal those of the samples", "stored numbers"
     if not any(name in run.attributes for name in metrics):
@@ -242,13 +277,16 @@ def _changed_metric(run: StoredRun, metrics: Metrics, solution: Solution) -> tup
 
 
 def _own_extremes(solution: Solution) -> dict[str, float]:
-    """Return the extremes of the printed equations' run at ode45's own points, which lie between
-    the samples, too.
+    """Return the extremes of a run of the printed equations at ode45's own points.
 
-    The equations are integrated again from the samples beside the extremes, and from those where
-    the rate bends most: where a blade passes its singular pitch, a peak is narrower than an
-    interval. {} of a run that broke off, which may have been singular after its last sample, and
-    where loads change over time.
+    These lie between the samples, too. The equations are integrated again from the samples beside
+    the extremes, and from those where the rate bends most: where a blade passes its singular pitch,
+    a peak is narrower than an interval. The result is empty for a run that broke off, which may
+    have been singular after its last sample, and where loads change over time.
+
+    Parameters
+    ----------
+    solution : the run rebuilt from its samples.
     """
     scene, trajectory = solution.scene, solution.trajectory
     angles, speeds = trajectory.angles[:, 0], np.abs(trajectory.rates[:, 0])
@@ -280,8 +318,10 @@ def _own_extremes(solution: Solution) -> dict[str, float]:
 
 
 def settings_faults(run: StoredRun) -> list[str]:
-    """Return what is wrong with the stored settings: each of the method's must be there, none else,
-    each within its range."""
+    """Return what is wrong with the stored settings, a line for each fault.
+
+    Each setting of the method must be there, no other, and each within its range.
+    """
     method = find_method_or_none(run.method)
     if method is None:
         return []
@@ -295,8 +335,16 @@ def settings_faults(run: StoredRun) -> list[str]:
 
 
 def _of_reference(scene: StoredScene, shipped: StoredRun | None, bounds: Bounds) -> Iterator[Check]:
-    """Yield checks of the reference in the file against the shipped one of the same scene; a file
-    without one cannot be judged."""
+    """Yield the checks of a file's reference against the shipped one of the same scene.
+
+    A scene without a reference in the file fails.
+
+    Parameters
+    ----------
+    scene : stored scene.
+    shipped : the shipped reference; None where there is none.
+    bounds : of the scene.
+    """
     stored = scene.reference
     hint = "an altered reference, or a changed scene or closed form"
     if stored is None:

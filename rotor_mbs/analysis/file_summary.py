@@ -28,16 +28,16 @@ _MOST_FAILED = 5  # runs that are not ok, with their reasons
 
 @dataclass
 class FileSummary:
-    """What is in a file of this program.
+    """Describe what is in a file of this program.
 
     Attributes
     ----------
     path, kind : the file, and "results", "sweep", "modes" or "comparison".
     attributes : of the file: versions of the programs that made it, the machine, and when.
     scenes, methods, outputs : names, in the order of the file.
-    labels : of scenes of which the file has what was changed in the shipped one, by name.
+    labels : by scene name, with what was changed in a shipped scene.
     statuses : number of runs, or comparisons, with each status.
-    lines, tables : what else there is to say of a file of its kind.
+    lines, tables : further text for a file of its kind.
     next : commands and calls, each with what it does.
     """
 
@@ -54,7 +54,7 @@ class FileSummary:
     next: list[tuple[str, str]] = field(default_factory=list)
 
     def as_dictionary(self) -> dict[str, Any]:
-        """Return it as JSON can hold it."""
+        """Return the summary as a dictionary for JSON."""
         return {
             "file": str(self.path),
             "kind": self.kind,
@@ -68,7 +68,7 @@ class FileSummary:
         }
 
     def __str__(self) -> str:
-        """Write the summary as a screen of text."""
+        """Return the summary as a screen of text."""
         size = self.path.stat().st_size
         parts = [f"{self.path}: {self.kind}, {size / 1e6:.3g} MB"]
         facts = {
@@ -92,19 +92,24 @@ class FileSummary:
 
 
 def counts(statuses: Mapping[str, int]) -> str:
-    """Return "18 ok, 2 inaccurate", the most frequent status first."""
+    """Return a text such as "18 ok, 2 inaccurate", the most frequent status first."""
     return ", ".join(f"{count} {status}" for status, count in Counter(statuses).most_common())
 
 
 def shortened(names: Sequence[str]) -> str:
-    """Return names as a list of at most eight, with how many there are."""
+    """Return names as a list of at most eight, with the number of all if there are more."""
     shown = ", ".join(names[:8])
     return f"{shown}, ... ({len(names)} in all)" if len(names) > 8 else shown
 
 
 def summary_of(path: Path) -> FileSummary:
-    """Return what is in a file. Raises StoreError where it cannot be read or is not of this
-    program."""
+    """Return a summary of what is in a file.
+
+    Raises
+    ------
+    StoreError
+        If it cannot be read or was not written by this program.
+    """
     kind = read_trailer(path).kind
     refuse_split(path, kind)
     of_kind = {RESULTS: _results, SWEEP: _sweep, MODES: _modes, COMPARISON: _comparison}
@@ -119,7 +124,12 @@ def summary_of(path: Path) -> FileSummary:
 
 
 def _results(path: Path) -> FileSummary:
-    """Return what is in a results file: scenes, methods, statuses, benches and ladders."""
+    """Return the summary of a results file: scenes, methods, statuses, benches and ladders.
+
+    Parameters
+    ----------
+    path : the file; the first few runs that failed are listed with their reasons.
+    """
     curves, ladders = read_records(path, "bench"), read_records(path, "stability")
     with open_results(path) as results:
         summary = FileSummary(path, RESULTS, results.attributes, list(results.scenes))
@@ -159,6 +169,7 @@ def _unique(names: Iterable[str]) -> list[str]:
 
 
 def _scene_table(scenes: Iterable[StoredScene]) -> TextTable:
+    """Return a row for each of the stored `scenes`: size, origin of the reference, statuses."""
     rows: list[tuple[str, ...]] = []
     for stored in scenes:
         scene = stored.scene
@@ -179,7 +190,12 @@ def _scene_table(scenes: Iterable[StoredScene]) -> TextTable:
 
 
 def _sweep(path: Path) -> FileSummary:
-    """Return what is in a sweep: its parameters, how many runs have which status."""
+    """Return the summary of a sweep: its parameters, and how many runs have which status.
+
+    Parameters
+    ----------
+    path : the dataset; runs that were damaged after they were written are counted.
+    """
     sweep = StoredSweep(path, allow_damaged_runs=True)
     codes = sweep.column("status")
     summary = FileSummary(
@@ -208,6 +224,7 @@ def _sweep(path: Path) -> FileSummary:
 
 
 def _modes(path: Path) -> FileSummary:
+    """Return the summary of a file of modes, with the modes of each scene as text."""
     found = read_modes(path)
     summary = FileSummary(path, MODES, read_content(path, ()).attributes, list(found))
     summary.labels = {name: modes.label for name, modes in found.items()}
@@ -221,7 +238,12 @@ def _modes(path: Path) -> FileSummary:
 
 
 def _comparison(path: Path) -> FileSummary:
-    """Return what is in a file of comparisons: a row for each, and why they do not agree."""
+    """Return the summary of a file of comparisons: a row for each, and why they do not agree.
+
+    Parameters
+    ----------
+    path : the file.
+    """
     records = read_records(path, COMPARISON)
     summary = FileSummary(
         path,

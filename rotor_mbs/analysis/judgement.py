@@ -52,7 +52,7 @@ _CLEAR_SHARE = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class Judgement:
-    """The outcome of a run.
+    """Hold the outcome of a run.
 
     Attributes
     ----------
@@ -71,15 +71,17 @@ class Judgement:
 
 
 def defects_of(scene: Scene, run: Trajectory) -> Defects | None:
-    """Return the defects of a run's intervals; None without angles and rates, or with fewer than
-    two samples."""
+    """Return the defects of a run's intervals.
+
+    None is returned without angles and rates, or with fewer than two samples.
+    """
     if len(run.time) < 2 or not (scene.wants("angles") and scene.wants("rates")):
         return None
     return interval_defects(scene, run.time, run.angles, run.rates)
 
 
 def bounds_of(method: str) -> Bounds:
-    """Return the bounds of any scene that a status is judged by, a method's own first."""
+    """Return the bounds by which a status is judged in any scene, a method's own first."""
     known = find_method_or_none(method)
     return shipped_bounds().with_entries(known.bounds if known else ())
 
@@ -87,8 +89,14 @@ def bounds_of(method: str) -> Bounds:
 # of a runaway: what is not finite is judged
 @np.errstate(over="ignore", invalid="ignore", divide="ignore")
 def judge(scene: Scene, run: Solution, reference: Trajectory | None) -> Judgement:
-    """Return the status of a run, its numbers, and whether its engine claims a success that it is
-    not."""
+    """Return the status of a run, its numbers, and whether its report of success is false.
+
+    Parameters
+    ----------
+    scene : the scene.
+    run : only its samples and its engine's report are used.
+    reference : of the scene; without one errors are predicted from the defects.
+    """
     bounds = bounds_of(run.method)
     defects = defects_of(scene, run.trajectory)
     metrics = metrics_of(
@@ -111,13 +119,18 @@ def clearly_ok(
     angles: Array,
     own: tuple[Bound, ...] = (),
 ) -> NDArray[np.bool_]:
-    """Return whether `judge`, without a reference, is certain to call each of k runs of a method
-    ok: (k,).
+    """Return whether each of k runs of a method is certain to be ok, (k,).
+
+    That is what `judge` would say without a reference, from a few numbers. A run that is not
+    clearly ok may be ok all the same.
 
     Parameters
     ----------
+    scenes, method : the scene of each run, and the name of the method.
+    integrations, samples : of each run its engine's report and its number of finite samples.
     metrics : of each run its energy_drift_max, and those of its defects where they were computed.
     angles : (k,) rad, the largest of each run.
+    own : bounds of the method.
     """
     bounds = shipped_bounds().with_entries(own)
     energy, defect = bounds.of("energy", method).value, defect_bound(bounds, method)
@@ -140,8 +153,16 @@ def clearly_ok(
 
 
 def _is_close(scene: Scene, status: str, metrics: Metrics) -> bool:
-    """Return whether a claim of success may stand: an inaccurate run that resembles the motion is
-    no false success; against an unchecked run's claim nothing is known."""
+    """Return whether an engine's claim of success may stand.
+
+    The claim of an inaccurate run that resembles the motion is not false, and nothing is known
+    against that of an unchecked run.
+
+    Parameters
+    ----------
+    scene : scales of quantities are relative to it.
+    status, metrics : of the run.
+    """
     if status != "inaccurate":
         return status in ("ok", "unchecked", "completed")
     errors = [metrics[name] for name in ("energy_drift_max", "defect_max") if name in metrics]
@@ -157,16 +178,27 @@ def _is_close(scene: Scene, status: str, metrics: Metrics) -> bool:
 
 
 def largest_angle_error(metrics: Metrics) -> float:
-    """Return the angle error (rad) up to the horizon, from the reference or predicted; 0 where
-    neither is known."""
+    """Return the angle error (rad) up to the horizon; 0 where it is not known.
+
+    It is that from the reference, or else the predicted one.
+    """
     return metrics.get("angle_error_max", metrics.get("angle_error_predicted", 0.0))
 
 
 def _status(
     run: RunSamples, integration: Integration, reference: Trajectory | None, bounds: Bounds
 ) -> tuple[str, str, str]:
-    """Return status, message and advice: of whether the end was reached, of a singularity, then of
-    the first check that fails."""
+    """Return status, message and advice of a run.
+
+    The order decides: whether the end was reached, a singularity, then the first check that fails.
+
+    Parameters
+    ----------
+    run : samples, metrics and defects.
+    integration : the engine's report.
+    reference : of the scene; None without one.
+    bounds : by which the checks are judged.
+    """
     scene, trajectory, metrics = run.scene, run.trajectory, run.metrics
     # Runs that did not reach the end, or that their engine calls failed.
     samples = len(trajectory.time)
@@ -250,9 +282,16 @@ def _too_far_apart(defects: Defects, count: int) -> str:
 
 
 def smallest_rotor_inertia_share(scene: Scene, run: Trajectory) -> float:
-    """Return the smallest S / (rotor inertia) at the last sample and on the straight way on to the
-    next one. S = J_hub + Σ (a - b²/Jzz) is the rotor's inertia with every pitch free to give way: m
-    (c² + d²) cos²θ for point masses."""
+    """Return the smallest S / (rotor inertia) about the last sample of a run.
+
+    It is taken over the straight line from the last sample to the next one. S = J_hub + Σ (a -
+    b²/Jzz) is the rotor's inertia with every pitch free to give way: m (c² + d²) cos²θ for point
+    masses.
+
+    Parameters
+    ----------
+    scene, run : a run without samples is at the initial angles of the scene.
+    """
     if not len(run.time):
         angles = np.array([scene.initial_angles])
     else:

@@ -381,7 +381,14 @@ class LinearModes(ModeSet):
         return largest
 
     def residual_of(self, i: int, value: complex, shape: Complex) -> float:
-        """Return the residual of an eigenvalue (1/s) with a shape (n,) at speed number i, see `residual`."""
+        """Return the residual of one eigenvalue with a shape, see `residual`.
+
+        Parameters
+        ----------
+        i : number of the speed.
+        value : 1/s, the eigenvalue.
+        shape : (n,) amplitudes.
+        """
         stiffness, damping = self.stiffness[i], self.damping[i]
         force = value * value * shape + value * (damping @ shape) + stiffness @ shape
         return float(np.linalg.norm(force) / (np.linalg.norm(shape) * self._terms(i, value)))
@@ -417,9 +424,9 @@ class LinearModes(ModeSet):
 
     @property
     def whirl(self) -> tuple[Array, Array]:
-        """Return backward and forward whirl frequencies of cosine and sine modes, (speeds, n) rad/s.
+        """Return the backward and forward whirl frequencies, (speeds, n) rad/s.
 
-        NaN for other modes.
+        They are those of cosine and sine modes; NaN for other modes.
         """
         harmonics = np.full(len(self.names), np.nan)
         for k, name in enumerate(self.names):
@@ -531,7 +538,7 @@ class SceneModes:
 
     @property
     def closed_form(self) -> list[LinearModes]:
-        """Return the modes of the closed form at rest and over speed, as far as they were computed."""
+        """Return the modes of the closed form at rest and over speed, where they were computed."""
         return [next(iter(kind.values())) for kind in (self.rest, self.rotation) if kind]
 
 

@@ -23,14 +23,17 @@ from rotor_mbs.solution.status import GOOD
 
 @dataclass(frozen=True)
 class Published:
-    """A number or claim of the paper, as in reference/published.toml.
+    """Hold a number or claim of the paper, as in reference/published.toml.
 
+    Attributes
+    ----------
+    id, figure, quote : identifier, place in the paper and its words.
     statement, tests : of a claim.
     scene, metric, value, decimals : of a number: it is this metric of a run of the scene, rad or
         rad/s.
     rounding : of a number, whether it is amplified rounding error, which depends on how the
         equations are written.
-    scenes : whose runs decide it.
+    scenes : names of the scenes whose runs decide it.
     printed, corrected : of a number, what a file's runs of the printed and the corrected model give
         (`claims`).
     """
@@ -51,12 +54,13 @@ class Published:
 
     @property
     def is_number(self) -> bool:
+        """Return whether it is a number, not a claim in words."""
         return bool(self.metric)
 
 
 @dataclass(frozen=True)
 class Erratum:
-    """An error in the printed equations; fields as in reference/errata.toml."""
+    """Hold an error in the printed equations; fields as in reference/errata.toml."""
 
     id: str
     entry: str
@@ -70,12 +74,16 @@ class Erratum:
 
 
 class CheckedEntry(NamedTuple):
-    """One printed entry against its derivative, as formulas.
+    """Hold one printed entry and its derivative, as formulas.
 
-    difference: the largest of |printed - right| / max(1, |printed|, |right|) over random states.
-    explained_by: the
-    fewest errata with which the paper's derivation gives what is printed, as "E1, E2"; "" where it
-    agrees, or where nothing explains it.
+    Attributes
+    ----------
+    equation, entry : which one it is.
+    printed, right : formulas.
+    difference : the largest of |printed - right| / max(1, |printed|, |right|) over random states.
+    agrees : whether both are equal.
+    explained_by : the fewest errata with which the paper's derivation gives what is printed, as
+        "E1, E2"; "" where it agrees, or where nothing explains it.
     """
 
     equation: str
@@ -100,8 +108,10 @@ def published() -> tuple[Published, ...]:
 
 
 def conditions() -> dict[str, str]:
-    """Return what had to be found out to reproduce the numbers: by subject (gravity, duration) or
-    scene (fig05)."""
+    """Return the conditions that had to be found out to reproduce the numbers.
+
+    They are texts by subject (gravity, duration) or scene (fig05).
+    """
     return dict(_tables("published")["conditions"])
 
 
@@ -115,10 +125,10 @@ def _tables(name: str) -> dict[str, Any]:
 
 
 def checked_entries() -> list[CheckedEntry]:
-    """Return every printed entry against derivatives of (3), in the order of the equations:
-    reference/errata-check.csv.
+    """Return every printed entry with its derivative of (3), in the order of the equations.
 
-    Tests compute every entry (`tests/support/printed_entries.py`) and compare the file with it.
+    They are read from reference/errata-check.csv. Tests compute every entry
+    (`tests/support/printed_entries.py`) and compare the file with it.
     """
     with (REFERENCES / "errata-check.csv").open(encoding="utf-8", newline="") as file:
         rows: list[dict[str, Any]] = list(csv.DictReader(file))
@@ -132,16 +142,18 @@ HOLDS, FAILS, UNDECIDED = "holds", "fails", "undecided"
 
 @dataclass(frozen=True)
 class ClaimStudy:
-    """The claims in words tested on many runs.
+    """Hold the verdicts on the claims in words, tested on many runs.
 
+    Attributes
+    ----------
     rule : of the verdicts, in words.
-    runs, durations, spread : of each scene for each duration in s; rad, by which their starts were
-        moved at most.
+    runs : number of runs of each scene for each duration.
+    durations : s.
+    spread : rad, by which their initial states were moved at most.
     methods : the printed and the corrected equations.
     verdicts : "holds", "fails" or "undecided" of each claim by method.
     shares : of each claim by method, for each duration: the share of the deciding runs in which it
-        holds (None where
-        none decides), and how many decide.
+        holds (None where none decides), and how many decide.
     """
 
     rule: str
@@ -176,8 +188,16 @@ ENERGY_RISE = 1e-3
 def claims(
     scenes: Mapping[str, StoredScene], items: Iterable[Published] | None = None
 ) -> list[Published]:
-    """Return the numbers that runs of the paper's scenes have, and the claims about those that are
-    all there; of `items`, or of all. A scene that was changed under its name is not the paper's."""
+    """Return the numbers and claims that runs of the paper's scenes can be compared with.
+
+    A claim needs all of its scenes, a number a run that has its metric. A scene that was changed
+    under its name is not the paper's.
+
+    Parameters
+    ----------
+    scenes : stored scenes by name.
+    items : numbers and claims; all of the paper by default.
+    """
     results = []
     for item in published() if items is None else items:
         if not all(name in scenes and scenes[name].is_shipped for name in item.scenes):
@@ -202,11 +222,20 @@ def rounds_to(value: float, item: Published) -> bool:
 def finding(
     scenes: Mapping[str, StoredScene], claims: Iterable[Published]
 ) -> list[tuple[str, str, str]]:
-    """Tell how much of the paper is reproduced, and the energy that its equations gain; empty for
-    other scenes.
+    """Return how much of the paper is reproduced, and the energy that its equations gain.
 
-    A row has a result, and what the equations as printed and the corrected model give; "" where
-    nothing is known.
+    The list is empty for other scenes.
+
+    Parameters
+    ----------
+    scenes : stored scenes by name.
+    claims : as `claims` returns them for these scenes.
+
+    Returns
+    -------
+    list of tuple of str
+        A result, and what the equations as printed and the corrected model give; "" where nothing
+        is known.
     """
     claims = list(claims)
     numbers = [claim for claim in claims if claim.is_number]

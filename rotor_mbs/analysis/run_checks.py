@@ -52,7 +52,7 @@ _GROWN = 1e4
 
 
 class Where(NamedTuple):
-    """The place of a check: scene, method and channel; the method is "*" for a whole scene."""
+    """Locate a check by scene, method and channel; the method is "*" for a whole scene."""
 
     scene: str
     method: str
@@ -61,12 +61,13 @@ class Where(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """A number against its bound.
+    """Hold a number and its bound.
 
     Attributes
     ----------
-    value, bound : both in `unit`.
-    hint : where a failure would come from.
+    name, where : of the check.
+    value, bound : both in `unit`; NaN fails.
+    hint : probable cause of a failure.
     fault : what a failure is called in a run's message; "" if its name, value and bound say it.
     """
 
@@ -84,22 +85,25 @@ class Check:
 
     @property
     def margin(self) -> float:
-        """How many times the value would fit into the bound; infinite for a value of zero."""
+        """Return how many times the value fits into the bound; infinite for a value of zero."""
         if math.isnan(self.value):
             return 0.0
         return self.bound / self.value if self.value else math.inf
 
     @property
     def message(self) -> str:
-        """The reason of a status, in a line."""
+        """Return the reason of a status, in a line."""
         what = f"{self.name}, {self.where.channel}: {self.value:.1e} {self.unit}".rstrip()
         return self.fault or f"{what}, allowed {self.bound:.0e}; {self.hint}"
 
 
 @dataclass(frozen=True)
 class RunSamples:
-    """The samples of a run, and what follows from them.
+    """Hold the samples of a run, and what follows from them.
 
+    Attributes
+    ----------
+    scene, method, trajectory : the run.
     metrics : those of `metrics_of`.
     defects : None without angles and rates, or with fewer than two samples.
     """
@@ -131,11 +135,13 @@ def bounded(
 def run_checks(run: RunSamples, bounds: Bounds, *, is_corrected: bool = True) -> Iterator[Check]:
     """Yield every check of a run that has samples.
 
-    The order is that in which they name the reason of a status: where a motion is wrong, so is much
-    of what follows from it.
+    The first check that fails names the reason of a status, so the order matters: where a motion is
+    wrong, so is much of what follows from it.
 
     Parameters
     ----------
+    run : the samples of the run, at least one.
+    bounds : bounds of the scene.
     is_corrected : whether the run claims the corrected equations; the motion of others is not
         checked.
     """
@@ -146,7 +152,12 @@ def run_checks(run: RunSamples, bounds: Bounds, *, is_corrected: bool = True) ->
 
 
 def _checks_of_rows(run: RunSamples, bounds: Bounds) -> Iterator[Check]:
-    """Yield sample times and initial state, which are the scene's."""
+    """Yield the checks of sample times and initial state, which are the scene's.
+
+    Parameters
+    ----------
+    run, bounds : see `run_checks`.
+    """
     scene, trajectory = run.scene, run.trajectory
     times = np.linspace(0.0, scene.duration, scene.samples)[: len(trajectory.time)]
     off = float(np.abs(trajectory.time - times).max()) / scene.duration
@@ -173,7 +184,14 @@ def _checks_of_rows(run: RunSamples, bounds: Bounds) -> Iterator[Check]:
 
 
 def _checks_of_outputs(run: RunSamples, bounds: Bounds) -> Iterator[Check]:
-    """Yield tips and energies against those of rigid bodies at the run's own angles and rates."""
+    """Yield the checks of tips and energies against those of rigid bodies.
+
+    The bodies are at the run's own angles and rates.
+
+    Parameters
+    ----------
+    run, bounds : see `run_checks`.
+    """
     scene, trajectory = run.scene, run.trajectory
     if not scene.wants("angles"):
         return
@@ -205,7 +223,12 @@ def _with_fault(check: Check, fault: str, scale: float = 1.0) -> Check:
 
 
 def _checks_of_energies(run: RunSamples, bounds: Bounds) -> Iterator[Check]:
-    """Yield stored energies against those of the bodies at the run's angles and rates."""
+    """Yield the checks of stored energies against those of the bodies at the run's states.
+
+    Parameters
+    ----------
+    run, bounds : see `run_checks`; the run has rates and energies.
+    """
     scene, trajectory = run.scene, run.trajectory
     angles, work = trajectory.angles, trajectory.work
     kinetic = kinematics.kinetic_energy(scene, angles, trajectory.rates)
@@ -232,8 +255,14 @@ def _checks_of_energies(run: RunSamples, bounds: Bounds) -> Iterator[Check]:
 
 
 def _checks_of_motion(run: RunSamples, bounds: Bounds) -> Iterator[Check]:
-    """Yield what is asked of the corrected equations: energy balance, loads, defects, error, exact
-    motion."""
+    """Yield the checks of the motion: energy balance, loads, defects, error, exact motion.
+
+    Only a run that claims the corrected equations has to pass them.
+
+    Parameters
+    ----------
+    run, bounds : see `run_checks`.
+    """
     scene, trajectory, metrics = run.scene, run.trajectory, run.metrics
     if "energy_drift_max" in metrics:
         drift = max(metrics["energy_drift_max"] - energy_slack(scene, trajectory), 0.0)
@@ -275,7 +304,14 @@ def _checks_of_motion(run: RunSamples, bounds: Bounds) -> Iterator[Check]:
 
 
 def _checks_of_defects(run: RunSamples, bounds: Bounds) -> Iterator[Check]:
-    """Yield the median and the largest of the defects; a bound above 0.01 rad counts as that."""
+    """Yield the checks of the median and the largest of the defects.
+
+    A bound on the largest that is above 0.01 rad counts as 0.01 rad.
+
+    Parameters
+    ----------
+    run, bounds : see `run_checks`; the run has defects.
+    """
     metrics = run.metrics
     if bounds.find("defect median", run.method):
         fault = f"median of the defects {metrics['defect_median']:.1e} rad, allowed {{bound}}"
@@ -303,7 +339,14 @@ def _checks_of_defects(run: RunSamples, bounds: Bounds) -> Iterator[Check]:
 
 
 def _error_fault(run: RunSamples, error: float, what: str) -> str:
-    """Return what an angle error that is too large is called, and why it has become so."""
+    """Return the message for an angle error that is too large, with the probable cause.
+
+    Parameters
+    ----------
+    run : see `run_checks`.
+    error : rad.
+    what : name of the error in the message.
+    """
     metrics, scene = run.metrics, run.scene
     text = (
         f"{what} {error:.1e} rad up to the horizon at {metrics['horizon_s']:.3g} s of "
@@ -323,8 +366,17 @@ def _error_fault(run: RunSamples, error: float, what: str) -> str:
 
 
 def symmetry_loss(run: RunSamples) -> tuple[int, float] | None:
-    """Return the first pitch, from 1, that leaves zero before the horizon although symmetry keeps
-    it there, and the time (s) at which it does."""
+    """Return the first pitch that leaves zero although symmetry keeps it there, and when.
+
+    None is returned where there is no such pitch before the horizon.
+
+    Returns
+    -------
+    int
+        Number of the pitch, from 1.
+    float
+        Time of its first sample away from zero, s.
+    """
     if run.defects is None or not run.defects.resting:
         return None
     away = np.abs(run.trajectory.angles[:, list(run.defects.resting)]) > LEFT_ZERO
@@ -341,13 +393,17 @@ def defect_bound(bounds: Bounds, method: str) -> float:
 
 
 def defect_allowed(metrics: Metrics, bound: float) -> float:
-    """Return what is allowed in the interval that `defect_judged` is of, rad."""
+    """Return the defect beyond rounding (rad) that is allowed in the worst interval.
+
+    That is the one whose `defect_judged` is in `metrics`; `bound` is that of the method for 0.01 s,
+    rad.
+    """
     judged, excess = metrics.get("defect_judged", 0.0), metrics.get("defect_excess", 0.0)
     return bound * (excess / judged) if 0.0 < judged < math.inf else bound
 
 
 def quantity_bound(rule: QuantityMetric, bounds: Bounds, method: str) -> float | None:
-    """Return the largest value that passes, None where the quantity is not checked."""
+    """Return the largest value of a quantity that passes; None where it is not checked."""
     entry = bounds.find(rule.check, method) if rule.check else None
     return entry.value if entry else rule.bound
 
@@ -355,8 +411,10 @@ def quantity_bound(rule: QuantityMetric, bounds: Bounds, method: str) -> float |
 def quantity_errors(
     scene: Scene, metrics: Metrics
 ) -> Iterator[tuple[Quantity, QuantityMetric, float]]:
-    """Yield each judged quantity, its rule, and its error relative to what the rule says; only
-    those in `metrics`."""
+    """Yield each judged quantity, its rule, and its error relative to the scale of the rule.
+
+    Only those with a value in `metrics` are included.
+    """
     for quantity in known_quantities(scene.outputs):
         rule = quantity.judgement
         if rule is not None and rule.metric in metrics:
@@ -368,8 +426,15 @@ def quantity_errors(
 
 
 def _checks_of_quantities(run: RunSamples, bounds: Bounds) -> Iterator[Check]:
-    """Yield the quantities that have a rule and a bound: gaps of joints, loads, those of
-    plug-ins."""
+    """Yield the checks of quantities that have a rule and a bound.
+
+    These are gaps of joints, loads, and quantities of plug-ins. What rounding may cause is
+    subtracted from the errors of loads.
+
+    Parameters
+    ----------
+    run, bounds : see `run_checks`.
+    """
     scene, trajectory = run.scene, run.trajectory
     rounding = _load_floors(run, bounds) if scene.wants("loads") and run.defects is not None else {}
     for quantity, rule, error in quantity_errors(scene, run.metrics):
@@ -396,8 +461,11 @@ def _checks_of_quantities(run: RunSamples, bounds: Bounds) -> Iterator[Check]:
 
 
 def _load_floors(run: RunSamples, bounds: Bounds) -> dict[str, Array]:
-    """Return what rounding leaves open of each load: that of the state, and of any engine's
-    arithmetic unless the method has a bound of its own."""
+    """Return the error of each load that rounding can cause, by name.
+
+    It is that of rounding the state and, unless the method has a bound of its own, that of any
+    engine's arithmetic.
+    """
     samples = run.trajectory.time, run.trajectory.angles, run.trajectory.rates
     floors = load_rounding(run.scene, *samples)
     if bounds.of("loads", run.method).method == "*":
@@ -407,21 +475,22 @@ def _load_floors(run: RunSamples, bounds: Bounds) -> dict[str, Array]:
 
 
 def start_slack(scene: Scene) -> float:
-    """Return what the digits of an angle that starts turns away from zero leave open (rad); 0
-    within a turn."""
+    """Return the error (rad) due to rounding of an initial angle that is turns away from zero.
+
+    It is 0 within a turn.
+    """
     return _START_ROUND_OFF * max(
         0.0, *(abs(angle) - 2.0 * np.pi for angle in scene.initial_angles)
     )
 
 
 def energy_slack(scene: Scene, run: Trajectory) -> float:
-    """Return the share of the energy scale that magnified round-off may add to a method's own
-    energy error."""
+    """Return the share of the energy scale that magnified round-off may add to an energy error."""
     return _ROUND_OFF * (energy_conditioning(scene, run) - 1.0) + start_slack(scene)
 
 
 def energy_conditioning(scene: Scene, run: Trajectory) -> float:
-    """Return by how much the energy magnifies round-off of the state, at least 1.
+    """Return the factor, at least 1, by which the energy magnifies round-off of the state.
 
     Near a pitch of π/2 its terms are 1/√share larger than it.
     """

@@ -42,8 +42,15 @@ def run_row(run: StoredRun) -> tuple[str, ...]:
 def table_of_runs(
     scenes: Mapping[str, StoredScene], wanted: Mapping[str, Iterable[str]]
 ) -> TextTable:
-    """Return a row for each of the `wanted` runs and their references; of many runs, one for each
-    method."""
+    """Return a row for each of the requested runs and their references.
+
+    Of more than MOST_ROWS runs the table has a row for each method.
+
+    Parameters
+    ----------
+    scenes : stored scenes by name.
+    wanted : names of methods by scene name.
+    """
     runs = []
     rows: list[tuple[str, ...]] = []
     for name, methods in wanted.items():
@@ -60,8 +67,12 @@ def table_of_runs(
 
 
 def method_table(runs: Iterable[StoredRun]) -> TextTable:
-    """Return a row for each method: how many of its runs ended well, and the largest numbers among
-    those."""
+    """Return a row for each method: how many runs ended well, and their largest numbers.
+
+    Parameters
+    ----------
+    runs : of any scenes and methods.
+    """
     head = (
         "method",
         "runs",
@@ -87,9 +98,15 @@ def method_table(runs: Iterable[StoredRun]) -> TextTable:
 
 
 def bench_table(curves: Sequence[Record]) -> TextTable:
-    """Return a row for each curve: how many settings are ok, the smallest error, and the run time
-    to reach given errors: empty if it does not, "not measured" if it might with finer settings,
-    which the budget left out."""
+    """Return a row for each curve: settings that are ok, smallest error, times to given errors.
+
+    A time is empty if the curve does not reach the error, and "not measured" if it might with finer
+    settings, which the budget left out.
+
+    Parameters
+    ----------
+    curves : records of a bench.
+    """
     rows = []
     for curve in curves:
         errors, seconds = points(curve)
@@ -134,7 +151,7 @@ def sweep_parameters(sweep: StoredSweep) -> TextTable:
 
 @dataclass(frozen=True)
 class TextTable:
-    """Table of text with a heading. Prints in columns; an HTML table in a notebook."""
+    """Hold a table of text with a heading; it prints in columns, and as HTML in a notebook."""
 
     head: tuple[str, ...]
     rows: list[tuple[str, ...]]

@@ -32,34 +32,57 @@ _FITTED = 4  # points, the finest ones above the floor
 
 
 class Reach(NamedTuple):
-    """When a curve reaches an error: s of run time, and how many times the fastest curve's."""
+    """Tell when a curve reaches an error.
+
+    Attributes
+    ----------
+    seconds : s of run time.
+    ratio : how many times the run time of the fastest curve.
+    """
 
     seconds: float
     ratio: float
 
 
 def succeeded(curve: Record, error: str = ANGLE_ERROR) -> NDArray[np.bool_]:
-    """Return which points stand on the curve, (settings,): run to the end, and not useless. A
-    coarse one need not be ok."""
+    """Return which points are on the curve, (settings,): run to the end, with a useful error.
+
+    The error of the angles is below USELESS_RAD; a coarse point need not be ok.
+
+    Parameters
+    ----------
+    curve : record of a bench.
+    error : column of errors that must be finite.
+    """
     is_complete = np.isin(curve.arrays["status"], [code_of(status) for status in COMPLETE])
     is_known = np.isfinite(curve.arrays[error]) & np.isfinite(curve.arrays["run_time_s"])
     return np.asarray(is_complete & is_known & (curve.arrays[ANGLE_ERROR] < USELESS_RAD))
 
 
 def failed(curve: Record) -> NDArray[np.bool_]:
-    """Return which points are failures, (settings,): run, and neither on the curve nor left out by
-    the budget."""
+    """Return which points are failures, (settings,).
+
+    They were run, and are neither on the curve nor left out by the budget.
+    """
     return np.asarray(~succeeded(curve) & (curve.arrays["status"] != code_of("left_out")))
 
 
 def left_out(curve: Record) -> int:
-    """Return how many of the finest settings of its ladder the budget left out: what it does not
-    reach they might."""
+    """Return how many of the finest settings of its ladder the budget left out.
+
+    An error that the curve does not reach might be reached by these.
+    """
     return curve.statuses.count("left_out")
 
 
 def points(curve: Record, error: str = ANGLE_ERROR) -> tuple[Array, Array]:
-    """Return (errors in rad, times in s) of the points on the curve."""
+    """Return the errors (rad) and times (s) of the points on the curve.
+
+    Parameters
+    ----------
+    curve : record of a bench.
+    error : column of the errors; those below SMALLEST_ERROR are raised to it.
+    """
     chosen = succeeded(curve, error)
     return np.maximum(curve.arrays[error][chosen], SMALLEST_ERROR), curve.arrays["run_time_s"][
         chosen
@@ -67,8 +90,14 @@ def points(curve: Record, error: str = ANGLE_ERROR) -> tuple[Array, Array]:
 
 
 def pareto(errors: Array, seconds: Array) -> NDArray[np.intp]:
-    """Return indices of the points that no other beats in both, by rising time: errors fall
-    strictly."""
+    """Return the indices of the points that no other beats in both error and time.
+
+    They are sorted by rising time; errors fall strictly.
+
+    Parameters
+    ----------
+    errors, seconds : (points,) rad and s.
+    """
     front: list[int] = []
     for i in np.lexsort((errors, seconds)):
         if not front or errors[i] < errors[front[-1]]:
@@ -77,10 +106,15 @@ def pareto(errors: Array, seconds: Array) -> NDArray[np.intp]:
 
 
 def time_to_reach(errors: Array, seconds: Array, target: float) -> float | None:
-    """Return the run time (s) to an error, on the front, straight in the logarithms between two
-    points; None where no point is as accurate.
+    """Return the run time (s) that an error needs; None where no point is as accurate.
 
-    Where already the fastest point is more accurate than asked for, its time.
+    It is interpolated on the Pareto front, linearly in the logarithms. Where already the fastest
+    point is more accurate than requested, it is the time of that point.
+
+    Parameters
+    ----------
+    errors, seconds : (points,) rad and s.
+    target : rad.
     """
     front = pareto(errors, seconds)
     if not len(front) or errors[front[-1]] > target:
@@ -99,10 +133,14 @@ def fastest(curves: Sequence[Record], target: float) -> list[tuple[Record, Reach
 
 
 def fitted_order(steps: Array, errors: Array) -> float | None:
-    """Return the slope of log error over log step on the finest points above the round-off floor;
-    None with fewer than two.
+    """Return the slope of log error over log step; None with fewer than two usable points.
 
-    steps: s, coarse to fine; errors: rad, > 0.
+    It is fitted to the finest points above the round-off floor.
+
+    Parameters
+    ----------
+    steps : (points,) s, coarse to fine.
+    errors : (points,) rad, > 0.
     """
     usable = errors < _ASYMPTOTIC_RAD
     h, e = steps[usable], errors[usable]
@@ -119,8 +157,16 @@ def fitted_order(steps: Array, errors: Array) -> float | None:
 
 
 def step_for(target: float, steps: Array, errors: Array) -> float | None:
-    """Return the step (s) where the error crosses `target` for good, by a straight line in
-    logarithms; None where it does not."""
+    """Return the step (s) below which the error stays below `target`; None where it does not.
+
+    It is interpolated linearly in the logarithms.
+
+    Parameters
+    ----------
+    target : rad.
+    steps : (points,) s, coarse to fine.
+    errors : (points,) rad.
+    """
     below = errors <= target
     if not below.any() or not below[-1]:
         return None

@@ -48,7 +48,10 @@ BLOCK_ROWS = 40 * DRIFT_ROWS
 
 @dataclass(frozen=True)
 class Defects:
-    """Interval defects of a run with n samples. Coordinates: rotor, then the pitch of each blade.
+    """Hold the interval defects of a run with n samples.
+
+    The coordinates are the rotor, then the pitch of each blade; m is twice the number of those that
+    move.
 
     Attributes
     ----------
@@ -60,15 +63,14 @@ class Defects:
     find_transitions : function that computes `transitions`.
     moving : coordinates with inertia.
     resting : pitches that stay at zero by symmetry, where the error is the state itself.
-    own_loads : loads of the closed form at the states of the run; without arrays if not requested.
-    growth_units : (m,) scales of the error growth of the scene: angles, then rates.
     states : (n, m) angles, then rates, of the moving coordinates of the run.
-    rounding : (n, m) half a unit in the last place of each of these numbers, and what half a unit
-        in the last place of
-        the row's time makes of them.
+    rounding : (n, m) half a unit in the last place of each of these numbers, and the effect of half
+        a unit in the last place of the row's time on them.
     conditioning : (n - 1,) factor by which the nearly singular mass matrix magnifies rounding
         inside an interval.
     start : (m,) initial state of the scene in these coordinates.
+    growth_units : (m,) scales of the error growth of the scene: angles, then rates.
+    own_loads : loads of the closed form at the states of the run; without arrays if not requested.
     precision : relative error of a step of the integration from row to row.
     """
 
@@ -89,35 +91,42 @@ class Defects:
 
     @functools.cached_property
     def transitions(self) -> Array:
-        """State transition matrices of the moving coordinates, (n - 1, m, m): angles, then rates;
-        infinite where the closed form has no end."""
+        """Return the state transition matrices of the moving coordinates, (n - 1, m, m).
+
+        Angles come first, then rates. A matrix is infinite where the closed form does not reach the
+        next row.
+        """
         return self.find_transitions()
 
     @functools.cached_property
     def sizes(self) -> Array:
-        """Largest defect over the coordinates, of angles and of rates in `rate_units`: (n - 1,)
-        rad; inf for NaN."""
+        """Return the largest defect over the coordinates, (n - 1,) rad; inf for NaN.
+
+        It is that of the angles, and of the rates in `rate_units`.
+        """
         both = np.hstack([np.abs(self.angles), np.abs(self.rates) / self.rate_units])
         return np.asarray(np.where(np.isfinite(both), both, np.inf).max(axis=1))
 
     @property
     def channel_sizes(self) -> Array:
-        """Magnitudes of the defects of the moving coordinates: (n - 1, m) rad, angles, then rates;
-        inf for NaN."""
+        """Return the magnitudes of the defects of the moving coordinates, (n - 1, m) rad.
+
+        Angles come first, then rates; inf for NaN.
+        """
         sizes = np.abs(self._vectors) / self._units
         return np.asarray(np.where(np.isfinite(sizes), sizes, np.inf))
 
     @property
     def floor(self) -> Array:
-        """Largest of `floors` over the coordinates: (n - 1,) rad."""
+        """Return the largest of `floors` over the coordinates, (n - 1,) rad."""
         return np.asarray(self.floors.max(axis=1))
 
     @functools.cached_property
     def floors(self) -> Array:
-        """Largest defects that rounding can cause, per coordinate: (n - 1, m) rad.
+        """Return the largest defects that rounding can cause, per coordinate: (n - 1, m) rad.
 
-        That of the row at the start, carried to the end; that of the row at the end; and that of
-        the arithmetic in between, which grows as much as any other error.
+        They add up from the rounding of the row at the start, carried to the end; that of the row
+        at the end; and that of the arithmetic in between, which grows as much as any other error.
         """
         with np.errstate(all="ignore"):
             carried = np.empty((len(self.angles), len(self.start)))
@@ -134,7 +143,7 @@ class Defects:
 
     @functools.cached_property
     def growth(self) -> Array:
-        """Error growth over each interval: (n - 1,)."""
+        """Return the error growth over each interval, (n - 1,)."""
         growth: Array = np.empty(len(self.angles))
         with np.errstate(all="ignore"):
             for rows in _blocks(len(growth)):
@@ -143,8 +152,10 @@ class Defects:
 
     @functools.cached_property
     def channel_excess(self) -> Array:
-        """Defects beyond rounding of the moving coordinates: (n - 1, m) rad; inf where a defect is
-        not finite."""
+        """Return the defects beyond rounding of the moving coordinates, (n - 1, m) rad.
+
+        inf where a defect is not finite.
+        """
         sizes = self.channel_sizes
         with np.errstate(invalid="ignore"):
             excess = np.maximum(sizes - FLOOR_SAFETY * self.floors, 0.0)
@@ -152,7 +163,7 @@ class Defects:
 
     @functools.cached_property
     def excess(self) -> Array:
-        """Largest defect beyond rounding over all coordinates: (n - 1,) rad."""
+        """Return the largest defect beyond rounding over all coordinates, (n - 1,) rad."""
         fixed = [i for i in range(self.angles.shape[1]) if i not in self.moving]
         sizes = np.hstack(
             [np.abs(self.angles[:, fixed]), np.abs(self.rates[:, fixed]) / self.rate_units[fixed]]
@@ -165,41 +176,52 @@ class Defects:
 
     @functools.cached_property
     def bound_factors(self) -> Array:
-        """Number by which a bound for 0.01 s is multiplied in each interval: (n - 1,)."""
+        """Return the number by which a bound for 0.01 s is multiplied in each interval, (n - 1,)."""
         length = np.maximum(np.diff(self.time) / _BOUND_INTERVAL, 1.0)
         return np.asarray(length * np.maximum(self.growth, 1.0))
 
     def in_bound_units(self, excess: Array) -> Array:
-        """Return (n - 1,) or (n - 1, m) defects beyond rounding, each divided by its interval's
-        `bound_factors`."""
+        """Return defects beyond rounding, each divided by its interval's `bound_factors`.
+
+        Parameters
+        ----------
+        excess : (n - 1,) or (n - 1, m) rad.
+        """
         factors = self.bound_factors.reshape(-1, *[1] * (excess.ndim - 1))
         with np.errstate(invalid="ignore"):
             return np.asarray(np.where(np.isfinite(excess), excess / factors, np.inf))
 
     @property
     def judged_sizes(self) -> Array:
-        """Values that are compared with a method's bound: (n - 1,) rad, `excess` divided by
-        `bound_factors`."""
+        """Return the values that are compared with a method's bound, (n - 1,) rad.
+
+        They are `excess` divided by `bound_factors`.
+        """
         return self.in_bound_units(self.excess)
 
     @property
     def is_resolved(self) -> NDArray[np.bool_]:
-        """Whether rounding explains at most 0.01 rad in each interval, or its defect has no end: (n
-        - 1,)."""
+        """Return whether rounding explains at most 0.01 rad in each interval, (n - 1,).
+
+        An interval whose defect is not finite is resolved, too.
+        """
         return np.asarray((FLOOR_SAFETY * self.floor <= OK_ERROR) | ~np.isfinite(self.sizes))
 
     @property
     def is_judged(self) -> NDArray[np.bool_]:
-        """Whether a defect of more than 0.01 rad would be seen in each interval, (n - 1,).
+        """Return whether a defect of more than 0.01 rad would be seen in each interval, (n - 1,).
 
-        It is resolved, and its own excess, where it passes its bound, is no larger.
+        It would be if the interval is resolved, and its own excess is at most 0.01 rad.
         """
         return np.asarray(self.is_resolved & (self.excess <= OK_ERROR))
 
     @property
     def predicted(self) -> Array:
-        """Error of the angles predicted from the initial state and the defects, (n, 1 + blades)
-        rad. Valid for errors that are small compared with 1 rad."""
+        """Return the error of the angles that the defects predict, (n, 1 + blades) rad.
+
+        The error of the initial state is included. It is valid for errors that are small compared
+        with 1 rad.
+        """
         half = len(self.moving)
         angles = np.zeros((len(self.time), self.angles.shape[1]))
         angles[:, list(self.moving)] = self._errors_and_drift[0][:, :half]
@@ -207,13 +229,16 @@ class Defects:
 
     @property
     def drift(self) -> float:
-        """Largest sum of defects over `DRIFT_ROWS` rows, each propagated to their end (rad)."""
+        """Return the largest sum of defects over `DRIFT_ROWS` rows, each propagated to their end (rad)."""
         return self._errors_and_drift[1]
 
     @functools.cached_property
     def error_growth(self) -> Array:
-        """Error growth along the run, (n,): 2-norm of the state transition matrix from the start in
-        the moving coordinates."""
+        """Return the error growth along the run, (n,).
+
+        It is the 2-norm of the state transition matrix from the start in the moving coordinates,
+        without those that rest at zero.
+        """
         half = len(self.moving)
         free = [i for i, coordinate in enumerate(self.moving) if coordinate not in self.resting]
         rows = np.array([*free, *(half + i for i in free)])
@@ -237,8 +262,10 @@ class Defects:
 
     @property
     def mean(self) -> float:
-        """Largest signed mean of the defects over the intervals that have an end (rad); NaN if
-        there are none."""
+        """Return the largest signed mean of the defects over the finite ones (rad).
+
+        NaN if there are none.
+        """
         finite = np.isfinite(self.sizes)
         if not finite.any():
             return float("nan")
@@ -246,11 +273,14 @@ class Defects:
         return float(np.abs(both.mean(axis=0)).max())
 
     def over_rows(self, rows: int) -> tuple[Array, Array]:
-        """Return sums of the defects over a number of rows, and the largest sums that rounding can
-        cause.
+        """Return sums of the defects over a number of rows, and the largest that rounding can cause.
 
         They reveal a drift that is smaller than single defects. Roundings of the rows in between,
         and of their times, cancel: one row ends an interval and begins the next.
+
+        Parameters
+        ----------
+        rows : number of intervals in a stretch.
 
         Returns
         -------
@@ -289,15 +319,17 @@ class Defects:
 
     @functools.cached_property
     def _vectors(self) -> Array:
-        """(n - 1, m) defects of the angles, then rates, of the coordinates that move."""
+        """Return the defects of the angles, then rates, of the coordinates that move: (n - 1, m)."""
         columns = list(self.moving)
         return np.hstack([self.angles[:, columns], self.rates[:, columns]])
 
     @functools.cached_property
     def _arithmetic(self) -> Array:
-        """(n - 1,) rad, error of the arithmetic within each interval: of the size of its largest
-        number in every step, independent from step to step. A step is taken to span about a radian
-        of the fastest coordinate."""
+        """Return the error of the arithmetic within each interval, (n - 1,) rad.
+
+        In every step it is of the size of its largest number, independent from step to step. A step
+        is taken to span about a radian of the fastest coordinate.
+        """
         sizes = (np.abs(self.states) / self._units).max(axis=1)
         fastest = np.abs(self.states[:, len(self.moving) :]).max(axis=1)
         largest, rate = (np.maximum(values[:-1], values[1:]) for values in (sizes, fastest))
@@ -306,8 +338,11 @@ class Defects:
 
     @functools.cached_property
     def _errors_and_drift(self) -> tuple[Array, float]:
-        """Return the errors of the states that the defects add up to, (n, m), and the largest sum
-        over `DRIFT_ROWS` rows."""
+        """Return the errors of the states, (n, m), and the largest sum of defects.
+
+        The errors are those that the defects add up to; the sums are over `DRIFT_ROWS` rows, in
+        rad.
+        """
         half = len(self.moving)
         resting = [i for i, coordinate in enumerate(self.moving) if coordinate in self.resting]
         at_zero = [*resting, *(half + i for i in resting)]
@@ -331,45 +366,47 @@ class Defects:
 
 
 def _blocks(count: int) -> Iterator[slice]:
-    """Yield slices of at most `BLOCK_ROWS` of `count` rows, a multiple of `DRIFT_ROWS` but for the
-    last."""
+    """Yield slices of at most `BLOCK_ROWS` of `count` rows.
+
+    Each is a multiple of `DRIFT_ROWS`, except the last.
+    """
     for start in range(0, count, BLOCK_ROWS):
         yield slice(start, min(start + BLOCK_ROWS, count))
 
 
 def _largest_entry(matrices: Array, units: Array) -> Array:
-    """Return the largest entry of each of (k, m, m) matrices in these units: (k,), infinite for
-    NaN.
+    """Return the largest entry of each of (k, m, m) matrices in these units, (k,).
 
-    It is between the growth of an error and a share 1 / m of it.
+    It is infinite for NaN. The growth of an error is at least this entry, and at most m times as
+    large.
     """
     entries = np.abs(matrices * units / units[:, None]).max(axis=(1, 2))
     return np.asarray(np.where(np.isnan(entries), np.inf, entries))
 
 
 def _with_small_numbers(floors: Array) -> Array:
-    """Return (k, m) floors with what roundings of other coordinates add by terms of second order,
-    and at least 1e-18.
+    """Return (k, m) floors with the second-order effect of roundings of other coordinates.
 
-    A coordinate that is next to zero has nearly no rounding of its own. NaN becomes infinite.
+    A coordinate that is next to zero has nearly no rounding of its own. The result is at least
+    1e-18 rad; NaN becomes infinite.
     """
     floors = floors + np.square(floors.max(axis=1, keepdims=True, initial=0.0)) + _SMALLEST_FLOOR
     return np.asarray(np.where(np.isnan(floors), np.inf, floors))
 
 
 def _carried(matrices: Array, offsets: Array, rows: int) -> tuple[Array, Array]:
-    """Carry on errors e that go on as matrix @ e + offset, in stretches of so many rows, all
-    stretches at once.
+    """Propagate errors e -> matrix @ e + offset in stretches of rows, all stretches at once.
 
     Parameters
     ----------
     matrices, offsets : (k, m, m) and (k, m) of every interval.
+    rows : number of intervals in a stretch.
 
     Returns
     -------
     products, errors : (stretches, 1 + rows, m, m) and (stretches, 1 + rows, m)
-        The product of the matrices since the start of the stretch, and what the offsets since then
-        add up to. The last stretch is filled with rows that change nothing.
+        The product of the matrices since the start of the stretch, and the sum of the offsets since
+        then, each propagated. The last stretch is filled with rows that change nothing.
     """
     k, m = offsets.shape
     stretches = max(-(-k // rows), 1)

@@ -32,7 +32,7 @@ Metrics = dict[str, float]
 
 @dataclass(frozen=True)
 class RowValue:
-    """A number or text in the row of a run, or of a point, in a file.
+    """Declare a number or text in the row of a run, or of a point, in a file.
 
     Attributes
     ----------
@@ -166,7 +166,10 @@ _LINEAR_FROM, _LINEAR_TO = 1e-12, 1e-2
 
 
 def running_growth(reference: Trajectory) -> Array:
-    """Return the largest error growth so far, at least 1, at each sample: (n,)."""
+    """Return the largest error growth so far, at least 1, at each sample: (n,).
+
+    It is 1 without a stored growth.
+    """
     growth = reference.get("error_growth")
     if growth is None:
         return np.ones(len(reference.time))
@@ -174,28 +177,38 @@ def running_growth(reference: Trajectory) -> Array:
 
 
 def horizon_samples(reference: Trajectory) -> int:
-    """Return how many samples lie before the horizon (all where the growth stays below
-    HORIZON_GROWTH)."""
+    """Return the number of samples before the horizon.
+
+    It is the number of all samples where the growth stays below HORIZON_GROWTH.
+    """
     beyond = running_growth(reference) >= HORIZON_GROWTH
     return int(np.argmax(beyond)) if beyond.any() else len(beyond)
 
 
 def horizon(reference: Trajectory) -> float:
-    """Return the time in s of the last sample before the error growth reaches HORIZON_GROWTH, or of
-    the last sample."""
+    """Return the time (s) of the last sample before the error growth reaches HORIZON_GROWTH."""
     return float(reference.time[max(horizon_samples(reference) - 1, 0)])
 
 
 def angle_error(run: Trajectory, reference: Trajectory) -> Array:
-    """Return the largest error of the angles over the coordinates, (common samples,) rad. Angles
-    are unwrapped: a lost turn is an error of 2π."""
+    """Return the largest error of the angles over the coordinates, (common samples,) rad.
+
+    Angles are unwrapped: a lost turn is an error of 2π.
+    """
     n = min(len(run.time), len(reference.time))
     return np.asarray(np.abs(run.angles[:n] - reference.angles[:n]).max(axis=1))
 
 
 def energy_scale(scene: Scene, run: Trajectory) -> float:
-    """Return the energy (J) that errors are relative to: Σ m g |r| + kinetic and spring energy at
-    the start + largest |work|; zero only where nothing moves."""
+    """Return the energy (J) that errors are relative to; zero only where nothing moves.
+
+    It is Σ m g |r| + kinetic and spring energy at the start + largest |work|.
+
+    Parameters
+    ----------
+    scene : its weights and springs are used.
+    run : its kinetic energy and work are used, where it has them.
+    """
     weights = sum(
         blade.mass * scene.gravity * float(np.linalg.norm(blade.centre_of_mass))
         for blade in scene.blades
@@ -221,9 +234,15 @@ def metrics_of(
     *,
     is_corrected: bool = True,
 ) -> Metrics:
-    """Return the metrics stored with a run, by the names of the file format; those that do not
-    exist are left out.
+    """Return the metrics stored with a run, by the names of the file format.
 
+    Those that cannot be computed are left out.
+
+    Parameters
+    ----------
+    scene, run : a run without samples has no metrics.
+    reference : of the scene; None without one.
+    defects : of the run; None where they are not known.
     is_corrected : whether the run claims the equations of the defects, so that their sum predicts
         its error.
     """
@@ -281,10 +300,11 @@ def metrics_of(
 def defect_metrics(
     defects: Defects, horizon_s: float | None, *, is_corrected: bool = True
 ) -> Metrics:
-    """Return the numbers of a run's interval defects.
+    """Return the metrics of a run's interval defects; those that are NaN are left out.
 
     Parameters
     ----------
+    defects : of the run.
     horizon_s : of the reference; None without a reference: that of the run itself.
     is_corrected : see `metrics_of`.
     """
@@ -313,15 +333,19 @@ def defect_metrics(
 
 
 def worst_interval(defects: Defects, *, is_corrected: bool = True) -> int:
-    """Return the interval that is furthest beyond its bound, or has the largest defect if none
-    exceeds rounding."""
+    """Return the number of the interval that is furthest beyond its bound.
+
+    It is that with the largest defect if none exceeds rounding, or if `is_corrected` is false.
+    """
     judged = defects.judged_sizes if is_corrected else np.zeros(1)
     return int(judged.argmax()) if judged.any() else int(defects.sizes.argmax())
 
 
 def interval_metrics(defects: Defects, interval: int, *, is_corrected: bool = True) -> Metrics:
-    """Return the numbers of one interval, of the worst one those that are stored: its end, and how
-    far it is beyond."""
+    """Return the end of an interval, and its excess and judged value if `is_corrected`.
+
+    Of the worst interval these are stored with the run.
+    """
     metrics = {"defect_time": float(defects.time[1 + interval])}
     if is_corrected:
         metrics["defect_excess"] = float(defects.excess[interval])
@@ -330,8 +354,16 @@ def interval_metrics(defects: Defects, interval: int, *, is_corrected: bool = Tr
 
 
 def _angle_errors(run: Trajectory, reference: Trajectory, until: int) -> Metrics:
-    """Compute errors of angles, only where there is a second sample: the first one is given, and
-    equal in every run."""
+    """Return the metrics of the errors of angles.
+
+    The first sample is given and equal in every run: those up to the horizon or over the run need a
+    second one.
+
+    Parameters
+    ----------
+    run, reference : both with angles.
+    until : number of samples up to the horizon.
+    """
     error = angle_error(run, reference)
     metrics: Metrics = {}
     # Pitches that are exactly zero in the reference: whether they stayed so, and if not, when and
@@ -359,8 +391,10 @@ def _angle_errors(run: Trajectory, reference: Trajectory, until: int) -> Metrics
 
 
 def largest(values: Array) -> Array:
-    """Return the largest size of each row of (k, n) values; samples that are not finite do not
-    count."""
+    """Return the largest magnitude of each row of (k, n) values, (k,).
+
+    Samples that are not finite are ignored.
+    """
     result: Array = np.abs(np.maximum(values.max(axis=1), -values.min(axis=1)))  # of zeros: not -0
     if not np.isfinite(result).all():
         magnitudes = np.abs(values)
@@ -369,8 +403,15 @@ def largest(values: Array) -> Array:
 
 
 def energy_drifts(scenes: Sequence[Scene], kinetic: Array, work: Array, errors: Array) -> Array:
-    """Return the largest energy error of each of k runs, relative to its scale (in J where that is
-    zero). From (k, n) J over the samples; NaN samples are not counted."""
+    """Return the largest energy error of each of k runs, relative to its scale, (k,).
+
+    It is in J where the scale is zero. NaN samples are ignored.
+
+    Parameters
+    ----------
+    scenes : of the runs.
+    kinetic, work, errors : (k, n) J over the samples.
+    """
     nothing = np.zeros((1, 1))
     still = Trajectory(nothing[0], nothing, nothing)
     at_rest = np.array([energy_scale(scene, still) for scene in scenes])
