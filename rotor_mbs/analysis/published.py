@@ -81,7 +81,7 @@ class CheckedEntry(NamedTuple):
     equation, entry : which one it is.
     printed, right : formulas.
     difference : the largest of |printed - right| / max(1, |printed|, |right|) over random states.
-    agrees : whether both are equal.
+    agrees : whether both agree.
     explained_by : the fewest errata with which the paper's derivation gives what is printed, as
         "E1, E2"; "" where it agrees, or where nothing explains it.
     """
@@ -125,7 +125,7 @@ def _tables(name: str) -> dict[str, Any]:
 
 
 def checked_entries() -> list[CheckedEntry]:
-    """Return every printed entry with its derivative of (3), in the order of the equations.
+    """Return every printed entry with the derivative of equation (3), in the order of the equations.
 
     They are read from reference/errata-check.csv. Tests compute every entry
     (`tests/support/printed_entries.py`) and compare the file with it.

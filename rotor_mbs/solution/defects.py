@@ -176,7 +176,7 @@ class Defects:
 
     @functools.cached_property
     def bound_factors(self) -> Array:
-        """Return the number by which a bound for 0.01 s is multiplied in each interval, (n - 1,)."""
+        """Return the factor of a bound for 0.01 s in each interval, (n - 1,)."""
         length = np.maximum(np.diff(self.time) / _BOUND_INTERVAL, 1.0)
         return np.asarray(length * np.maximum(self.growth, 1.0))
 
@@ -229,7 +229,10 @@ class Defects:
 
     @property
     def drift(self) -> float:
-        """Return the largest sum of defects over `DRIFT_ROWS` rows, each propagated to their end (rad)."""
+        """Return the largest sum of defects over `DRIFT_ROWS` rows (rad).
+
+        Each defect is propagated to the end of these rows.
+        """
         return self._errors_and_drift[1]
 
     @functools.cached_property
@@ -273,7 +276,7 @@ class Defects:
         return float(np.abs(both.mean(axis=0)).max())
 
     def over_rows(self, rows: int) -> tuple[Array, Array]:
-        """Return sums of the defects over a number of rows, and the largest that rounding can cause.
+        """Return sums of the defects over a number of rows, and what rounding can cause of them.
 
         They reveal a drift that is smaller than single defects. Roundings of the rows in between,
         and of their times, cancel: one row ends an interval and begins the next.
@@ -284,7 +287,8 @@ class Defects:
 
         Returns
         -------
-        sums, floors : (k, m) rad, of k stretches of `rows` intervals.
+        sums, floors : (k, m) rad, of k stretches of `rows` intervals; floors are the largest sums
+            that rounding can cause.
         """
         count = len(self.angles) // rows * rows
         sums, floors = np.empty((2, count // rows, len(self.start)))
@@ -319,7 +323,7 @@ class Defects:
 
     @functools.cached_property
     def _vectors(self) -> Array:
-        """Return the defects of the angles, then rates, of the coordinates that move: (n - 1, m)."""
+        """Return the defects of the moving coordinates, (n - 1, m): angles, then rates."""
         columns = list(self.moving)
         return np.hstack([self.angles[:, columns], self.rates[:, columns]])
 

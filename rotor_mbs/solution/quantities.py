@@ -25,11 +25,10 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class QuantityMetric:
-    """Metric that is computed from a quantity and stored with the run, and the largest value that
-    passes.
+    """Declare a metric that is computed from a quantity, and the largest value that passes.
 
-    The metric is the largest magnitude over all samples (of the vectors, if the last dimension is
-    `axis`).
+    It is stored with the run. The metric is the largest magnitude over all samples (of the vectors,
+    if the last dimension is `axis`).
 
     Attributes
     ----------
@@ -38,8 +37,7 @@ class QuantityMetric:
         horizon.
     relative_to : (scene) -> number by which the metric is divided for the check; None for 1.
     at_own_state : whether it is that of the difference from the array of the closed form at the
-        run's own state, over
-        all samples.
+        run's own state, over all samples.
     scale_of : (scene, samples) -> number by which the metric is divided before it is stored; None
         for 1.
     check : name of a check in reference/accuracy.toml that has the bound; "" if `bound` is used.
@@ -64,8 +62,13 @@ class QuantityMetric:
 
 @dataclass(frozen=True, slots=True)
 class Plot:
-    """Plot of a quantity over time: title, label of the vertical axis, and whether that is
-    logarithmic."""
+    """Describe the plot of a quantity over time.
+
+    Attributes
+    ----------
+    title, axis : title, and label of the vertical axis.
+    logarithmic : whether the vertical axis is logarithmic.
+    """
 
     title: str
     axis: str
@@ -132,12 +135,15 @@ SCALES = {
 
 
 def sample_times(scene: Scene) -> Array:
+    """Return the sample times of a scene, (samples,) s."""
     return np.linspace(0.0, scene.duration, scene.samples)
 
 
 def scale_values(scene: Scene) -> dict[str, NDArray[np.float64] | NDArray[np.int64]]:
-    """Return the scales of a complete run: time in s, and the numbers of coordinates, blades and
-    axes."""
+    """Return the scales of a complete run by name.
+
+    They are the time in s, and the numbers of coordinates, blades and axes.
+    """
     blades = len(scene.blades)
     return {
         "time": sample_times(scene),
@@ -158,15 +164,19 @@ def row_shape(quantity: Quantity, scene: Scene) -> tuple[int, ...]:
 
 @np.errstate(over="ignore", invalid="ignore")  # of a runaway: the judgement sees what is not finite
 def energy_balance(kinetic: Array, potential: Array, work: Array) -> Array:
-    """Return total energy less work, less its value at the start, of one run or of many: (..., n)
-    J."""
+    """Return total energy minus work, minus its value at the start: (..., n) J.
+
+    Parameters
+    ----------
+    kinetic, potential, work : (..., n) J, of one run or of many.
+    """
     total = kinetic + potential - work
     error: Array = total - total[..., :1]  # of a run without a sample, too
     return error
 
 
 def energy_error(samples: Trajectory) -> Array | None:
-    """Return the energy balance of a run, (n,) J; None where energies were not asked for."""
+    """Return the energy balance of a run, (n,) J; None where energies were not requested."""
     kinetic, potential, work = (
         samples.get(name) for name in ("kinetic_energy", "potential_energy", "work")
     )
@@ -176,8 +186,10 @@ def energy_error(samples: Trajectory) -> Array | None:
 
 
 def longest_arm(scene: Scene) -> float:
-    """Return the largest distance (m) of a blade's centre of mass from the hub's centre; 1 where
-    all are there."""
+    """Return the largest distance (m) of a blade's centre of mass from the hub's centre.
+
+    It is 1 where all of them are there.
+    """
     return max(math.hypot(*blade.centre_of_mass) for blade in scene.blades) or 1.0
 
 
@@ -188,14 +200,24 @@ def _largest_root_force(_scene: Scene, run: Trajectory) -> float:
 
 
 def _largest_root_force_at_arm(scene: Scene, run: Trajectory) -> float:
-    """Return the largest root force at the longest arm (N m): a scale for moments, which may all be
-    next to nothing."""
+    """Return the largest root force times the longest arm (N m).
+
+    It is a scale for moments, which may all be nearly zero.
+    """
     return _largest_root_force(scene, run) * longest_arm(scene)
 
 
 def _load(
     name: str, dimensions: tuple[str, ...], long_name: str, title: str, look_at: str
 ) -> Quantity:
+    """Return the declaration of a load, which is compared with the closed form at the run's state.
+
+    Parameters
+    ----------
+    name, dimensions, long_name : of the quantity; a name that ends with "force" has the unit N.
+    title : of its plot.
+    look_at : probable cause of a failure.
+    """
     is_force = name.endswith("force")
     rule = QuantityMetric(
         f"{name}_error",
@@ -268,9 +290,14 @@ LOADS = (
 def named_loads(
     roots: Iterable[tuple[Array, Array]], shaft_force: Array, shaft_moment: Array, actuators: Array
 ) -> dict[str, Array]:
-    """Return the arrays of `LOADS` by name, from each blade's (n, 3) force (N) and moment (N m) at
-    its root in its frame, the shaft's in the base frame, and the (n, blades) moments of the
-    actuators."""
+    """Return the arrays of `LOADS` by name.
+
+    Parameters
+    ----------
+    roots : for each blade the (n, 3) force (N) and moment (N m) at its root in its frame.
+    shaft_force, shaft_moment : (n, 3) N and N m, in the base frame.
+    actuators : (n, blades) N m.
+    """
     forces, moments = (np.stack(vectors, axis=1) for vectors in zip(*roots, strict=True))
     arrays = forces, moments, shaft_force, shaft_moment, actuators
     return {
@@ -384,24 +411,41 @@ NAMES = frozenset(quantity.name for quantity in BUILT_IN)
 
 
 def known_quantities(outputs: Iterable[str] = ()) -> tuple[Quantity, ...]:
-    """Return the built-in quantities, and those that installed packages bring for `outputs`. Raises
-    InputError where an output is neither."""
+    """Return the built-in quantities, and those that installed packages add for `outputs`.
+
+    Raises
+    ------
+    InputError
+        If an output is neither.
+    """
     return BUILT_IN + tuple(
         quantity for output in outputs if output not in _OUTPUTS for quantity in installed(output)
     )
 
 
 def quantities(outputs: Iterable[str]) -> tuple[Quantity, ...]:
-    """Return the quantities that a scene's `outputs` ask for, and those that are stored whenever a
-    model has them. Raises InputError."""
+    """Return the quantities that a scene's `outputs` request.
+
+    Those that are stored whenever a model has them are included.
+
+    Raises
+    ------
+    InputError
+        If an output is unknown.
+    """
     asked = {"", *outputs}
     return tuple(quantity for quantity in known_quantities(asked) if quantity.output in asked)
 
 
 @functools.cache
 def installed(output: str) -> tuple[Quantity, ...]:
-    """Return the quantities of the entry point called `output`. Raises InputError where there is
-    none, or it is not valid."""
+    """Return the quantities of the entry point called `output`.
+
+    Raises
+    ------
+    InputError
+        If there is no such entry point, it cannot be loaded, or one of its quantities is not valid.
+    """
     points = tuple(entry_points(group=ENTRY_POINT_GROUP, name=output))
     if not points:
         raise InputError(
@@ -448,9 +492,25 @@ def installed(output: str) -> tuple[Quantity, ...]:
 
 
 def array_of(quantity: Quantity, scene: Scene, samples: Trajectory) -> Array | None:
-    """Return a quantity of a run: the model's own array, or what the quantity's producer makes of
-    the samples; None where there is none. Raises InputError where a producer gives an array of
-    another shape."""
+    """Return a quantity of a run; None where there is none.
+
+    It is the model's own array, or what the quantity's producer computes from the samples.
+
+    Parameters
+    ----------
+    quantity, scene : the declaration, and the scene of the run.
+    samples : n samples of the run.
+
+    Returns
+    -------
+    ndarray or None
+        (n, ...) with the shape of `row_shape`, in the unit of the quantity.
+
+    Raises
+    ------
+    InputError
+        If a producer returns an array of another shape.
+    """
     values = samples.get(quantity.name)
     if values is not None or quantity.producer is None:
         return values
@@ -468,6 +528,7 @@ def array_of(quantity: Quantity, scene: Scene, samples: Trajectory) -> Array | N
 
 
 def arrays(scene: Scene, samples: Trajectory) -> dict[str, Array]:
+    """Return the arrays that a scene requests and a run has, by name of the quantity."""
     by_name = {
         quantity.name: array_of(quantity, scene, samples) for quantity in quantities(scene.outputs)
     }
@@ -475,8 +536,10 @@ def arrays(scene: Scene, samples: Trajectory) -> dict[str, Array]:
 
 
 def sizes(quantity: Quantity, values: Array) -> Array:
-    """Return magnitudes of an array of this quantity: with the last dimension `axis`, lengths of
-    the vectors."""
+    """Return the magnitudes of an array of this quantity.
+
+    With the last dimension `axis` they are the lengths of the vectors.
+    """
     lengths: Array = (
         np.linalg.norm(values, axis=-1) if quantity.dimensions[-1] == "axis" else np.abs(values)
     )
@@ -486,9 +549,16 @@ def sizes(quantity: Quantity, values: Array) -> Array:
 def deviation(
     quantity: Quantity, scene: Scene, run: Trajectory, reference: Trajectory | None
 ) -> Array | None:
-    """Return the size of a quantity, or of its difference from the reference, largest over the
-    other axes: (common samples,). None where it is not judged, or the run or the needed reference
-    does not have it."""
+    """Return the size of a quantity, or of its difference from the reference: (common samples,).
+
+    It is the largest over the other axes. None is returned where the quantity is not judged, or the
+    run or the reference that is needed does not have it.
+
+    Parameters
+    ----------
+    quantity, scene : the declaration, and the scene of the run.
+    run, reference : samples; the reference is used if the rule of the quantity says so.
+    """
     rule = quantity.judgement
     if rule is None:
         return None

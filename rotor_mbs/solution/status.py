@@ -39,12 +39,15 @@ OK_ERROR = 0.01
 
 
 def code_of(status: str) -> int:
+    """Return the code of a status in a file: its place in STATUSES."""
     return STATUSES.index(status)
 
 
 class Comparison(NamedTuple):
-    """What a status follows from, as texts for a table; "" for what a run does not have.
+    """Hold what a status follows from, as texts for a table; "" for what a run does not have.
 
+    Attributes
+    ----------
     defect, allowed : rad, the defect furthest beyond rounding and what is allowed in its interval,
         or "rounding".
     error : rad, the largest angle error up to the horizon; predicted from the defects without a
@@ -59,7 +62,13 @@ class Comparison(NamedTuple):
 
 
 def comparison(metrics: Mapping[str, Any], duration: float) -> Comparison:
-    """Return what a status follows from, from the metrics of a run of `duration` seconds."""
+    """Return what a status follows from, as texts.
+
+    Parameters
+    ----------
+    metrics : of a run, by name.
+    duration : of its scene, s.
+    """
     excess, allowed = metrics.get("defect_excess"), metrics.get("defect_allowed")
     defect = excess or metrics.get("defect_max")
     of_bound = "" if allowed is None else "rounding" if excess == 0.0 else short_number(allowed)
@@ -74,9 +83,10 @@ def comparison(metrics: Mapping[str, Any], duration: float) -> Comparison:
 
 
 def _seconds(time: float) -> str:
+    """Return a time in s with three digits, or as a whole number from 1000 s."""
     return f"{time:.3g}" if time < 1000.0 else f"{time:.0f}"
 
 
 def short_number(value: object) -> str:
-    """Return a number with two digits; "" for None and what is not finite."""
+    """Return a number with two digits; "" for None and what is not a finite float."""
     return f"{value:.1e}" if isinstance(value, float) and math.isfinite(value) else ""

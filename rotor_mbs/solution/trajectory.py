@@ -31,12 +31,18 @@ from rotor_mbs.solution.status import OK_ERROR, comparison
 
 
 class Trajectory:
-    """Samples of a run at equally spaced times, up to its end (n rows, all finite). Angles are
-    unwrapped.
+    """Hold the samples of a run at equally spaced times, up to its end: n rows, all finite.
 
-    Angles and rates have the shape (n, 1 + blades); those of a file that does not have them are
-    NaN. Other quantities are in `quantities` by name; built-in ones are also attributes, None if
-    the scene does not request them or the model does not compute them."""
+    Angles and rates have the shape (n, 1 + blades), angles unwrapped; those of a file that does not
+    have them are NaN. Other quantities are in `quantities` by name; built-in ones are also
+    attributes, None if the scene does not request them or the model does not compute them.
+
+    Parameters
+    ----------
+    time : (n,) s.
+    angles, rates : (n, 1 + blades) rad and rad/s, rotor first.
+    quantities : (n, ...) arrays by name; None is left out.
+    """
 
     # An array that is set elsewhere than in `quantities` would not be found.
     __slots__ = ("angles", "quantities", "rates", "refined", "time")
@@ -58,8 +64,10 @@ class Trajectory:
         )
 
     def replace(self, **changes: Array | None) -> Trajectory:
-        """Return a copy with other arrays, without `refined`; None removes an array. Arrays are not
-        copied."""
+        """Return a copy with other arrays, without `refined`; None removes an array.
+
+        Arrays are not copied.
+        """
         arrays: dict[str, Any] = {
             "time": self.time,
             "angles": self.angles,
@@ -77,8 +85,10 @@ class Trajectory:
 
 
 def shape_fault(scene: Scene, run: Trajectory) -> str:
-    """Return the name of the array that has not the shape of the scene, or not a row for each time;
-    "" where all have."""
+    """Return what is wrong with the shapes of a run's arrays; "" where all are right.
+
+    Each array must have the shape of the scene, with a row for each time.
+    """
     time = np.shape(run.time)
     if len(time) != 1:
         return f"time has the shape {time}; allowed: one dimension"
@@ -92,8 +102,9 @@ def shape_fault(scene: Scene, run: Trajectory) -> str:
 
 @dataclass(slots=True)
 class Integration:
-    """Report of the engine on an integration. A reported success is not relied on; a reported
-    failure is.
+    """Report how an engine ended an integration.
+
+    A reported success is not relied on; a reported failure is.
 
     Attributes
     ----------
@@ -114,7 +125,7 @@ class Integration:
 
 @dataclass
 class RunBlock:
-    """Several runs, of scenes with the same number of blades and samples and the same outputs.
+    """Hold several runs of scenes with equal numbers of blades and samples and equal outputs.
 
     Attributes
     ----------
@@ -130,6 +141,7 @@ class RunBlock:
     samples: list[int]
 
     def trajectory(self, i: int) -> Trajectory:
+        """Return the finite samples of run i."""
         n = self.samples[i]
         return Trajectory(
             self.time[i, :n], **{name: values[i, :n] for name, values in self.quantities.items()}
@@ -145,8 +157,15 @@ class RunBlock:
 
 
 def all_coordinates(scene: Scene, angles: Array, rates: Array) -> tuple[Array, Array]:
-    """Return (n, 1 + blades) rad and rad/s from those of `scene.moving_coordinates`; a pitch that
-    is fixed keeps its angle."""
+    """Return angles and rates of all coordinates from those that move: (n, 1 + blades).
+
+    A pitch that is fixed keeps its initial angle.
+
+    Parameters
+    ----------
+    scene : tells which coordinates move.
+    angles, rates : (n, m) rad and rad/s of its `moving_coordinates`.
+    """
     moving = scene.moving_coordinates
     all_angles = np.tile(np.array(scene.initial_angles, dtype=angles.dtype), (len(angles), 1))
     all_rates = np.zeros_like(all_angles)
@@ -155,6 +174,7 @@ def all_coordinates(scene: Scene, angles: Array, rates: Array) -> tuple[Array, A
 
 
 def finite_rows(*tables: Array) -> int:
+    """Return the number of rows before the first that is not finite in one of the tables."""
     finite = np.all(
         [np.isfinite(table).all(axis=tuple(range(1, table.ndim))) for table in tables], axis=0
     )
@@ -162,8 +182,13 @@ def finite_rows(*tables: Array) -> int:
 
 
 def finite_samples(scene: Scene, arrays: Mapping[str, Array]) -> Trajectory:
-    """Return the samples of all `arrays` by name, (samples reached, ...), up to the first in which
-    one is not finite."""
+    """Return the samples up to the first in which one of the arrays is not finite.
+
+    Parameters
+    ----------
+    scene : gives the sample times.
+    arrays : (samples reached, ...) by name.
+    """
     n = finite_rows(*arrays.values())
     return Trajectory(
         sample_times(scene)[:n], **{name: values[:n] for name, values in arrays.items()}
@@ -172,8 +197,10 @@ def finite_samples(scene: Scene, arrays: Mapping[str, Array]) -> Trajectory:
 
 @dataclass(frozen=True)
 class Linearization:
-    """Equations δq̈ + D δq̇ + K δq = 0 about a state of constant rates, the mass matrix divided
-    out."""
+    """Hold equations δq̈ + D δq̇ + K δq = 0 about a state of constant rates.
+
+    The mass matrix is divided out.
+    """
 
     # (n, n) 1/s²: M⁻¹ times the derivative of the forces by the coordinates, sign turned
     stiffness: Array
@@ -184,8 +211,15 @@ class Linearization:
 
 
 def scene_at(scene: Scene, angles: Sequence[float] | Array, speed: float, torque: float) -> Scene:
-    """Return `scene` at `angles` (1 + blades,) rad, its rotor turning at `speed` rad/s under
-    `torque` N m."""
+    """Return `scene` with another initial state and a constant torque on the rotor.
+
+    Parameters
+    ----------
+    scene : its outputs become the angles alone.
+    angles : (1 + blades,) rad, rotor first.
+    speed : rad/s, of the rotor; the pitches are at rest.
+    torque : N m.
+    """
     return replace(
         scene,
         initial_angles=tuple(float(angle) for angle in angles),
@@ -197,8 +231,13 @@ def scene_at(scene: Scene, angles: Sequence[float] | Array, speed: float, torque
 
 def limit_at_zero(quotients: Sequence[Array], ratio: float) -> Array:
     """Extrapolate difference quotients with the steps h, 2h, 4h, ... to a step of 0 (Richardson).
-    ratio: by which a doubled step enlarges each further term of the error, 2 for one-sided
-    quotients, 4 for central ones."""
+
+    Parameters
+    ----------
+    quotients : the one with the smallest step first.
+    ratio : factor by which a doubled step enlarges each further term of the error, 2 for one-sided
+        quotients, 4 for central ones.
+    """
     values = list(quotients)
     for power in range(1, len(values)):
         values = [
@@ -210,7 +249,10 @@ def limit_at_zero(quotients: Sequence[Array], ratio: float) -> Array:
 
 @dataclass
 class Solution:
-    """Result of a method applied to a scene.
+    """Hold the result of a method applied to a scene.
+
+    Quantities are attributes and items: `solution.tip`, `solution["tip"]`; (n, ...) arrays, n
+    samples.
 
     Attributes
     ----------
@@ -219,13 +261,9 @@ class Solution:
     integration : report of the engine.
     settings : all settings of the method.
     setup_time_s, run_times_s, output_time_s : times (s) to build the model, for each integration,
-        and to compute the
-        samples; no run times if they are unknown.
+        and to compute the samples; no run times if they are unknown.
     status, message : status determined from the samples, and its reason; "" if not assessed.
     metrics : numbers by their names in a results file, such as energy_drift_max.
-
-    Quantities are attributes and items: `solution.tip`, `solution["tip"]`; (n, ...) arrays, n
-    samples.
     """
 
     scene: Scene
@@ -242,24 +280,28 @@ class Solution:
 
     @property
     def time(self) -> Array:
-        """Sample times, (n,) s."""
+        """Return the sample times, (n,) s."""
         return self.trajectory.time
 
     @property
     def angles(self) -> Array:
-        """Angles of the rotor, then the pitch of each blade: (n, 1 + blades) rad; NaN if not
-        stored."""
+        """Return the angles of the rotor, then the pitch of each blade: (n, 1 + blades) rad.
+
+        NaN if they are not stored.
+        """
         return self.trajectory.angles
 
     @property
     def rates(self) -> Array:
-        """Rates of the rotor, then the pitch of each blade: (n, 1 + blades) rad/s; NaN if not
-        stored."""
+        """Return the rates of the rotor, then the pitch of each blade: (n, 1 + blades) rad/s.
+
+        NaN if they are not stored.
+        """
         return self.trajectory.rates
 
     @property
     def quantities(self) -> dict[str, Array]:
-        """Arrays of the scene's `outputs`, by name."""
+        """Return the arrays of the scene's `outputs`, by name."""
         return all_arrays(self.scene, self.trajectory)
 
     def __getitem__(self, name: str) -> Array:
@@ -283,8 +325,10 @@ class Solution:
         raise AttributeError(name)
 
     def to_xarray(self) -> Any:
-        """Return the samples as an xarray.Dataset with units, long names and labels:
-        `data.angles.sel(coordinate="pitch 1")`, `data.tip.sel(blade=1, axis="y")`."""
+        """Return the samples as an xarray.Dataset with units, long names and labels.
+
+        For example `data.angles.sel(coordinate="pitch 1")`, `data.tip.sel(blade=1, axis="y")`.
+        """
         import xarray  # late: 0.4 s
 
         labels = {"coordinate": list(self.scene.coordinate_labels), "axis": ["x", "y", "z"]}
@@ -313,7 +357,7 @@ class Solution:
         return xarray.Dataset(variables, coordinates, {**facts, **self.metrics})
 
     def _summary(self) -> dict[str, str]:
-        """Return the lines that a run prints: scene, method, status and largest values."""
+        """Return the facts that a run prints, by name: method, status and largest values."""
         last = float(self.time[-1]) if len(self.time) else self.integration.time_reached
         reached = f"{last:g} s of {self.scene.duration:g} s, {len(self.time)} samples"
         shown = comparison(self.metrics, self.scene.duration)
@@ -335,7 +379,7 @@ class Solution:
         return {name: text for name, text in rows.items() if text}
 
     def _arrays(self) -> str:
-        """Return "time (1001,) s, angles (1001, 4) rad, ...": the arrays that it has."""
+        """Return a text such as "time (1001,) s, angles (1001, 4) rad": the arrays that it has."""
         units = {quantity.name: quantity.units for quantity in quantities(self.scene.outputs)}
         shown = [f"time {self.time.shape} s"]
         for name, values in self.quantities.items():
