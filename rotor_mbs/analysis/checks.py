@@ -1,8 +1,7 @@
-"""What `rotor-mbs check` finds in a results file: numbers against bounds, each with what to look at
-where it fails.
+"""Checks of a results file, as `rotor-mbs check` reports them: numbers against bounds.
 
-Every number is computed again from the stored samples; a stored metric or status is checked, never
-used.
+Each check has a hint to the cause where it fails. Every number is computed again from the stored
+samples; a stored metric or status is checked, never used.
 """
 
 from __future__ import annotations
@@ -292,6 +291,7 @@ def _own_extremes(solution: Solution) -> dict[str, float]:
     angles, speeds = trajectory.angles[:, 0], np.abs(trajectory.rates[:, 0])
     if len(angles) < scene.samples or not scene.has_constant_loads:
         return {}
+    # Second differences of the rate: they are large where a peak may lie between two samples.
     bends = np.abs(np.diff(speeds, 2, prepend=speeds[0], append=speeds[-1]))
     intervals = {*np.argsort(-np.maximum(bends[:-1], bends[1:]))[:_MOST_INTERVALS].tolist()}
     for row in (int(angles.argmin()), int(angles.argmax()), int(speeds.argmax())):
@@ -320,7 +320,8 @@ def _own_extremes(solution: Solution) -> dict[str, float]:
 def settings_faults(run: StoredRun) -> list[str]:
     """Return what is wrong with the stored settings, a line for each fault.
 
-    Each setting of the method must be there, no other, and each within its range.
+    Each setting of the method of `run` must be there, no other, and each within its range. The
+    list is empty for an unknown method.
     """
     method = find_method_or_none(run.method)
     if method is None:

@@ -1,4 +1,4 @@
-"""What is in a file that this program wrote, and what to do with it next."""
+"""Summary of a file that this program wrote: its content, and what to do with it next."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ def shortened(names: Sequence[str]) -> str:
 
 
 def summary_of(path: Path) -> FileSummary:
-    """Return a summary of what is in a file.
+    """Return a summary of what is in the file at `path`.
 
     Raises
     ------

@@ -295,6 +295,7 @@ def smallest_rotor_inertia_share(scene: Scene, run: Trajectory) -> float:
     if not len(run.time):
         angles = np.array([scene.initial_angles])
     else:
+        # A singularity may lie between the last sample and the one that was not reached.
         step = scene.duration / (scene.samples - 1)
         angles = run.angles[-1] + np.linspace(0.0, step, 65)[:, None] * run.rates[-1]
     return float(rotor_inertia_shares(scene, angles).min())

@@ -1,5 +1,4 @@
-"""What is known of a scene without any model: tip paths and energies by plain rotation of bodies,
-exact solutions."""
+"""Kinematics of a scene without any model: tip paths, energies and exact solutions."""
 
 from __future__ import annotations
 
@@ -210,6 +209,7 @@ def _pendulum(scene: Scene, time: Array) -> tuple[str, Array] | None:
     amplitude = math.pi - (scene.initial_angles[0] + lead)  # from straight down
     if not -math.pi < amplitude < math.pi:
         return None
+    # It starts at rest: a quarter of a period (ellipk) before it passes straight down.
     modulus = math.sin(amplitude / 2.0)
     sn = ellipj(ellipk(modulus**2) - frequency * time, modulus**2)[0]
     return "pendulum", math.pi - 2.0 * np.arcsin(modulus * sn) - lead

@@ -1,10 +1,10 @@
-"""Modes of linearized equations: frequencies, damping ratios, shapes in multiblade coordinates,
-Floquet multipliers; of a scene over rotor speed, as arrays, as lines for readers, and as records of
-a results file.
+"""Modes of linearized equations of a scene over rotor speed.
+
+They have frequencies, damping ratios, shapes in multiblade coordinates and Floquet multipliers, as
+arrays, as text, and as records of a results file.
 
 Symbols: λ eigenvalue (1/s) of d/dt (δq, δq̇); ω0 = |λ| undamped and ωd = |Im λ| damped frequency
-(rad/s),
-ζ = -Re λ / ω0 damping ratio; μ Floquet multiplier.
+(rad/s), ζ = -Re λ / ω0 damping ratio; μ Floquet multiplier.
 
 /modes/<scene>/<model>/rest        equilibrium under gravity, one row of `speed`
 /modes/<scene>/<model>/rotation    steady rotation without gravity: the Campbell diagram
@@ -151,6 +151,8 @@ def modes_of(
         0.
     """
     n = len(stiffness)
+    # The equations of first order, of the positions and then the rates; without the rotor's angle,
+    # which is the first coordinate, where nothing depends on it.
     matrix = np.block([[np.zeros((n, n)), np.eye(n)], [-stiffness, -damping]])
     first = 1 if is_cyclic else 0
     values, vectors = np.linalg.eig(matrix[first:, first:])
@@ -161,6 +163,8 @@ def modes_of(
     shapes = []
     for vector in vectors.T:
         positions, rates = vector[: n - first], vector[n - first :]
+        # Rates are λ times the positions: of an eigenvalue near 0 they are rounding. Otherwise they
+        # have the rotor's amplitude, too, where its angle is left out.
         slow = np.linalg.norm(rates) <= 1e-7 * np.linalg.norm(positions)
         shapes.append(_normalized(np.concatenate([np.zeros(first), positions]) if slow else rates))
     # Both eigenvalues of each mode, and its shape.
@@ -175,6 +179,7 @@ def modes_of(
     if is_cyclic:
         slowest = single.pop(0)
         pairs.append(((values[slowest], 0j), shapes[slowest]))
+    # Real eigenvalues, from the largest on: each is paired with that of the most similar shape.
     while single:
         last = single.pop()
         partner = max(
@@ -221,6 +226,7 @@ def isotropic_modes(stiffness: Array, damping: Array) -> ModeSet:
         values.reverse()
         shapes.reverse()
     for i in range(2, n):
+        # Each further coordinate is an oscillator of its own: λ² + D λ + K = 0.
         root = np.sqrt(complex((0.5 * D[i, i]) ** 2 - K[i, i]))
         values.append(np.array([-0.5 * D[i, i] + root, -0.5 * D[i, i] - root]))
         shapes.append(np.eye(n, dtype=complex)[i])
@@ -257,6 +263,7 @@ def in_order_of(first: ModeSet, other: ModeSet) -> ModeSet:
     size = max(float(np.abs(other.eigenvalues).max()), 1e-300)
     likeness = _assurance(first.shapes, other.shapes)
     likeness -= np.abs(first.eigenvalues[:, None, 0] - other.eigenvalues[None, :, 0]) / size
+    # One to one, so that the sum of all likenesses is largest.
     order = linear_sum_assignment(-likeness)[1]
     return ModeSet(other.eigenvalues[order], other.shapes[order])
 
@@ -290,11 +297,14 @@ def floquet(
     if not np.isfinite(transition).all():
         nothing = np.full(len(transition), complex(np.nan, np.nan))
         return nothing, nothing
+    # Rates are divided by the rotor speed, so that all numbers of the state have one unit.
     units = np.repeat([1.0, speed], len(flow) // 2)
     scaled = transition * units / units[:, None]
     fixed = [flow / units, gradient * units]
     fixed = [vector / np.linalg.norm(vector) for vector in fixed if np.any(vector)]
     basis, _ = np.linalg.qr(np.column_stack(fixed), mode="complete")
+    # The space orthogonal to both. The hyperplane normal to `gradient` is mapped into itself and
+    # contains `flow`: without the direction of `flow` it has the other multipliers.
     rest = basis[:, len(fixed) :]
     values = np.linalg.eigvals(scaled).astype(complex)
     others = np.linalg.eigvals(rest.T @ scaled @ rest).astype(complex)
@@ -402,6 +412,7 @@ class LinearModes(ModeSet):
         _, sizes, vectors = np.linalg.svd(
             value * value * np.eye(n) + value * self.damping[i] + self.stiffness[i]
         )
+        # An eigenvalue makes the matrix singular: its shapes are the null space, up to rounding.
         is_shape = sizes <= max(10.0 * sizes[-1], _NO_FORCE * self._terms(i, value))
         return np.asarray(vectors[is_shape].conj())
 
@@ -876,7 +887,7 @@ def linear_dataset(sources: Mapping[str, LinearModes], xarray: Any) -> Any:
 
 
 def read_modes(path: Path) -> dict[str, SceneModes]:
-    """Read all modes in a file, by scene.
+    """Read all modes in the file at `path`, by scene.
 
     Raises
     ------

@@ -1,5 +1,6 @@
-"""What the paper says, read from the shipped files under `reference/`: numbers, claims, errata, its
-entries checked; the same numbers read off stored runs, and how much of the paper is reproduced.
+"""Numbers, claims and errata of the paper, and how many of them stored runs reproduce.
+
+They are read from the shipped files under `reference/`, with the check of each printed entry.
 
 The paper's runs are chaotic: a claim may hold for one rounding and fail for the next. So its
 verdict is that of runs from many starts moved by rounding, for several durations, as
@@ -125,7 +126,7 @@ def _tables(name: str) -> dict[str, Any]:
 
 
 def checked_entries() -> list[CheckedEntry]:
-    """Return every printed entry with the derivative of equation (3), in the order of the equations.
+    """Return every printed entry with the derivative of equation (3), in the paper's order.
 
     They are read from reference/errata-check.csv. Tests compute every entry
     (`tests/support/printed_entries.py`) and compare the file with it.

@@ -81,6 +81,7 @@ class Check:
 
     @property
     def passed(self) -> bool:
+        """Return whether the value is at most the bound; NaN is not."""
         return self.value <= self.bound  # False for NaN
 
     @property
@@ -370,6 +371,10 @@ def symmetry_loss(run: RunSamples) -> tuple[int, float] | None:
 
     None is returned where there is no such pitch before the horizon.
 
+    Parameters
+    ----------
+    run : its defects say which pitches rest at zero by symmetry.
+
     Returns
     -------
     int
@@ -413,7 +418,10 @@ def quantity_errors(
 ) -> Iterator[tuple[Quantity, QuantityMetric, float]]:
     """Yield each judged quantity, its rule, and its error relative to the scale of the rule.
 
-    Only those with a value in `metrics` are included.
+    Parameters
+    ----------
+    scene : its outputs decide which quantities there are.
+    metrics : of the run; quantities without a value in it are left out.
     """
     for quantity in known_quantities(scene.outputs):
         rule = quantity.judgement

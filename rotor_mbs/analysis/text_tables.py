@@ -1,5 +1,4 @@
-"""Small tables for a terminal or a notebook: of runs, of methods over many runs, of bench
-curves."""
+"""Small tables for a terminal or a notebook: runs, methods over many runs, bench curves."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a work-precision diagram says in numbers: Pareto front, time to an accuracy, orders."""
+"""Numbers of a work-precision diagram: Pareto front, time to an accuracy, orders."""
 
 from __future__ import annotations
 
@@ -119,6 +119,7 @@ def time_to_reach(errors: Array, seconds: Array, target: float) -> float | None:
     front = pareto(errors, seconds)
     if not len(front) or errors[front[-1]] > target:
         return None
+    # Errors fall along the front; np.interp needs increasing abscissas, hence the minus signs.
     e, t = np.log(errors[front]), np.log(seconds[front])
     return float(np.exp(np.interp(-math.log(target), -e, t)))
 
@@ -170,6 +171,7 @@ def step_for(target: float, steps: Array, errors: Array) -> float | None:
     below = errors <= target
     if not below.any() or not below[-1]:
         return None
+    # The last step whose error is above the target; -1 where all are below.
     last = len(errors) - 1 - int(np.argmin(below[::-1])) if not below.all() else -1
     if last < 0 or not np.isfinite(errors[last]) or errors[last + 1] == 0.0:
         return float(steps[last + 1])

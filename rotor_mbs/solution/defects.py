@@ -1,6 +1,6 @@
-"""Interval defects of a run: the closed form integrated from each sample to the next, minus the
-run's next sample.
+"""Interval defects of a run: its error over each interval between samples.
 
+A defect is the closed form integrated from a sample to the next, minus the run's next sample.
 Within one interval between samples no chaos can grow, so that defects need no horizon: every second
 of every run is judged, and a fault is located in time. Their signed sum, carried to the end by the
 transition matrices of the intervals, predicts the error of the whole run without a reference.
@@ -252,6 +252,7 @@ class Defects:
         for block in _blocks(len(self.angles)):
             scaled = self.transitions[block, rows[:, None], rows] * units / units[:, None]
             with np.errstate(all="ignore"):
+                # First the products within all stretches at once, then from stretch to stretch.
                 products, _ = _carried(scaled, np.zeros((len(scaled), len(rows))), DRIFT_ROWS)
                 for stretch in products:
                     stretch[:] = stretch @ whole
@@ -361,6 +362,7 @@ class Defects:
             with np.errstate(all="ignore"):
                 products, sums = _carried(matrices, offsets, DRIFT_ROWS)
                 drift = max(drift, float((np.abs(sums) / self._units).max(initial=0.0)))
+                # The sums within the stretches are known: only their starts follow each other.
                 for product, own in zip(products, sums, strict=True):
                     last = min(row + DRIFT_ROWS, block.stop)
                     ends = product[1:] @ errors[row] + own[1:]
@@ -420,6 +422,7 @@ def _carried(matrices: Array, offsets: Array, rows: int) -> tuple[Array, Array]:
     steps, added = steps.reshape(stretches, rows, m, m), added.reshape(stretches, rows, m)
     products, errors = np.empty((stretches, 1 + rows, m, m)), np.zeros((stretches, 1 + rows, m))
     products[:, 0] = np.eye(m)
+    # The loop is over the rows of a stretch, not over all intervals: a step does all stretches.
     for row in range(rows):
         products[:, row + 1] = steps[:, row] @ products[:, row]
         errors[:, row + 1] = np.einsum("kij,kj->ki", steps[:, row], errors[:, row]) + added[:, row]

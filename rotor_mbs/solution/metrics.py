@@ -1,5 +1,6 @@
-"""How far a run is from a reference, and from its own energy: one set of metrics for runs, reports
-and checks.
+"""Metrics of a run: its distance from a reference, its energy error, its defects.
+
+Runs, reports and checks have the same ones.
 
 `METRICS` declares each of them once: its unit, and which tables of a file have it.
 """
@@ -374,6 +375,8 @@ def _angle_errors(run: Trajectory, reference: Trajectory, until: int) -> Metrics
         metrics["zero_pitch_max"] = float(away.max())
         if (away > LEFT_ZERO).any():
             metrics["zero_pitch_left_s"] = float(run.time[int(np.argmax(away > LEFT_ZERO))])
+            # Exponential growth is a straight line in the logarithm. It is fitted from above
+            # round-off to where the motion ceases to be linear.
             large = away >= _LINEAR_TO
             linear_until = int(np.argmax(large)) if large.any() else len(away)
             linear = (away > _LINEAR_FROM) & (np.arange(len(away)) < linear_until)
@@ -412,6 +415,7 @@ def energy_drifts(scenes: Sequence[Scene], kinetic: Array, work: Array, errors: 
     scenes : of the runs.
     kinetic, work, errors : (k, n) J over the samples.
     """
+    # As `energy_scale`: weights and springs of each scene at rest, then what depends on the run.
     nothing = np.zeros((1, 1))
     still = Trajectory(nothing[0], nothing, nothing)
     at_rest = np.array([energy_scale(scene, still) for scene in scenes])

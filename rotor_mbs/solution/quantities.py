@@ -1,6 +1,8 @@
-"""The output quantities of a run, each declared once: dimensions, units, who computes it, how it is
-judged and drawn. Further ones come from packages that have an entry point in the group
-`rotor_mbs.quantities`."""
+"""Output quantities of a run, each declared once.
+
+A declaration has dimensions, units, who computes the quantity, and how it is judged and plotted.
+Further ones come from packages that have an entry point in the group `rotor_mbs.quantities`.
+"""
 
 from __future__ import annotations
 
@@ -77,7 +79,7 @@ class Plot:
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
-    """Output quantity: an array that is computed for a run.
+    """Declare an output quantity: an array that is computed for a run.
 
     Attributes
     ----------
@@ -87,8 +89,7 @@ class Quantity:
     output : entry of a scene's `outputs` that requests it; "" if it is stored whenever the model
         computes it.
     producer : (scene, samples) -> array, a formula for all methods; returns None if it lacks input.
-        None if each model
-        computes the quantity from its own state.
+        None if each model computes the quantity from its own state.
     required : whether every run of a built-in method must have it where its scene requests it.
     judgement : how it is checked; None if it is not, or by a rule of its own.
     plot : how it is plotted; None if it has no plot of its own.
@@ -465,6 +466,7 @@ def installed(output: str) -> tuple[Quantity, ...]:
         raise InputError(
             f"{where}: is a {type(loaded).__name__}; allowed: a Quantity or a sequence of them"
         )
+    # The faults of all quantities are reported at once.
     problems = []
     allowed = sorted(set(SCALES) - {"time"})
     for quantity in brought:

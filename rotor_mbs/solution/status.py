@@ -1,5 +1,8 @@
-"""How a run ended: the one list of statuses, and their integer codes. Files have CF's `flag_values`
-and `flag_meanings`, so that the order of the list may differ between files."""
+"""Statuses of runs: how a run ended, and the integer codes of files.
+
+Files have CF's `flag_values` and `flag_meanings`, so that the order of the list may differ between
+files.
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,8 @@
-"""What a model returns of a run (samples by quantity, the engine's report, equations linearized
-about a steady state), and a run as a Python user has it: scene, method, samples, status, numbers,
-times."""
+"""Samples and results of runs.
+
+A model returns samples by quantity, the engine's report, and equations linearized about a steady
+state. A Python user has a `Solution`: scene, method, samples, status, numbers, times.
+"""
 
 from __future__ import annotations
 
@@ -239,6 +241,7 @@ def limit_at_zero(quotients: Sequence[Array], ratio: float) -> Array:
         quotients, 4 for central ones.
     """
     values = list(quotients)
+    # Each pass cancels the leading term of the error between neighbours, and leaves one value less.
     for power in range(1, len(values)):
         values = [
             fine + (fine - coarse) / (ratio**power - 1.0)

@@ -1,1 +1,4 @@
-"""One module per job: cases in, records out. Knows no terminal and no argument parser."""
+"""Studies: one module per job, which computes records from scenes.
+
+None of them knows a terminal or an argument parser.
+"""

@@ -1,8 +1,7 @@
-"""Error and run time: curves of methods over ladders of settings, a row per point in the table
-/bench.
+"""Error and run time: curves of methods over ladders of settings.
 
-The curves of a scene are timed together, in rounds over all their points, by one worker process on
-one core.
+The table /bench has a row per point. The curves of a scene are timed together, in rounds over all
+their points, by one worker process on one core.
 """
 
 from __future__ import annotations
@@ -109,10 +108,12 @@ class Curve:
 
     @property
     def method(self) -> str:
+        """Return the name of the method."""
         return self.points[0].method
 
     @property
     def label(self) -> str:
+        """Return a text for messages: scene, curve and table."""
         return f"{self.scene.name} {self.name} {self.table}"
 
     @property
@@ -125,6 +126,7 @@ class Curve:
         return [file.place(str(point.known["run"]), self.table) for point in self.points]
 
     def is_stored(self, file: TableFile) -> bool:
+        """Return whether all of its rows are stored in `file`."""
         return all(place.is_stored for place in self.places(file))
 
 
@@ -329,6 +331,7 @@ def time_in_rounds(
     allowed = allocate_repeats(
         [max(point.warm_s, 1e-9) for point in points], wanted, budget_s - (clock() - start)
     )
+    # One run of every point in each round: when the machine is slow for a while, all points are.
     for round_ in range(max(allowed, default=0)):
         for point, count in zip(points, allowed, strict=True):
             if round_ and clock() - start > budget_s:  # the machine has become slower
@@ -383,6 +386,8 @@ def allocate_repeats(seconds: Sequence[float], wanted: Sequence[int], budget_s: 
     """
     counts = [0] * len(seconds)
     by_demand = sorted(range(len(seconds)), key=lambda i: wanted[i] * seconds[i])
+    # The least demanding first: what they leave raises the share of those after them. The factor
+    # keeps rounding from taking a run off a share that is a whole number of runs.
     for done, i in enumerate(by_demand):
         share = budget_s / (len(by_demand) - done) * (1.0 + 1e-12)
         counts[i] = max(1, min(wanted[i], int(share / seconds[i])))

@@ -1,5 +1,4 @@
-"""The accuracy check: a results file against bounds, or a default set that is computed for the
-purpose."""
+"""Accuracy check of a results file, or of a default set of runs, against bounds."""
 
 from __future__ import annotations
 
@@ -229,7 +228,9 @@ def runs_gone(path: Path, earlier: Path) -> Check:
 def scenes_checked(path: Path | None) -> dict[str, Scene]:
     """Return the scenes of a file by name; of a sweep the one that is varied.
 
-    Without a file they are those of the default set.
+    Parameters
+    ----------
+    path : a results file or a sweep; None for the scenes of the default set.
 
     Raises
     ------
@@ -315,6 +316,7 @@ def regressions(new: Sequence[Check], old: Sequence[Check]) -> list[Check]:
         if now is None:
             value, hint = math.nan, "checked in the earlier file, missing in this one"
         else:
+            # Of a check that fails now: infinite if it passed before, else 1.
             value = math.inf if check.passed else 1.0
             if now.passed and check.passed:
                 before, after = max(check.value, _ROUNDING), max(now.value, _ROUNDING)

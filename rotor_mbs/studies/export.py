@@ -1,4 +1,4 @@
-"""A scene for other programs: for MuJoCo, for Exudyn, its reference trajectory as CSV."""
+"""Export of a scene: files for MuJoCo and Exudyn, its reference trajectory as CSV."""
 
 from __future__ import annotations
 

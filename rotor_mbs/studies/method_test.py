@@ -1,5 +1,6 @@
-"""Examine a method: does it build, is its protocol kept, are its motions right, and what is wrong
-where they are not.
+"""Examine a method: whether it builds, keeps the protocol, and gives correct motions.
+
+Where a motion is not correct, its cause is looked for.
 
 Every run is made in a worker process with a time limit. Its samples pass the same checks as those
 of `run` and `check`. Where a motion is wrong, other equations and numbers are tried on its own
@@ -485,6 +486,10 @@ class _Examination:
 
         Nothing is added for a method without a ladder of steps or a claimed order, or where no
         order can be fitted.
+
+        Parameters
+        ----------
+        scene : short and smooth; it is run with each step of the ladder.
         """
         ladder = next((one for one in self._method.ladders if one.kind == STEP), None)
         if ladder is None or self._method.order is None:
@@ -541,6 +546,10 @@ def protocol_fault(solution: Solution) -> str:
 
     The rows must be finite, as many as the scene has samples, at its sample times, and with
     unwrapped angles.
+
+    Parameters
+    ----------
+    solution : not judged; its status is "" if it has samples.
     """
     scene, run, integration = solution.scene, solution.trajectory, solution.integration
     if solution.status == "solver_failed":  # without samples
@@ -562,6 +571,8 @@ def protocol_fault(solution: Solution) -> str:
         return f"reports a failure: {integration.message or 'no reason given'}"
     if n > scene.samples or np.abs(run.time - times).max() > 1e-9 * scene.duration:
         return "its times are not the scene's sample times"
+    # The change of each angle beyond the integral of its rate (trapezoidal rule): an angle that is
+    # wrapped changes by a turn more or less.
     turned = (
         np.diff(run.angles, axis=0)
         - 0.5 * (run.rates[1:] + run.rates[:-1]) * np.diff(times)[:, None]

@@ -1,8 +1,8 @@
-"""Modes of a scene by every model that can be linearized: at rest, over rotor speed, and over a
-turn under gravity.
+"""Modes of a scene by every model that can be linearized.
 
-What is linearized about, the steady state, is found by the closed form and handed to all models;
-each says for itself how far from steady it is there.
+They are computed at rest, over rotor speed, and over a turn under gravity. The steady state that
+equations are linearized about is computed by the closed form and passed to all models; each of them
+returns the accelerations that remain there.
 """
 
 from __future__ import annotations
@@ -228,7 +228,7 @@ def _linear(
         notes.append(_BALANCED)
 
     def over_speed(values: Sequence[NDArray[Any]], nothing: complex = np.nan) -> NDArray[Any]:
-        """By speed; NaN where there is no steady state."""
+        """Return values at all speeds, `nothing` where there is no steady state."""
         whole = np.full((len(points), *values[0].shape), nothing, values[0].dtype)
         whole[there] = values
         return whole
@@ -343,6 +343,7 @@ def _floquet_table(scene: Scene, speeds: Array) -> modal.FloquetTable:
     """
     from rotor_mbs.models.lagrange.floquet import periodic_turn
 
+    # From the fastest down: the motion at a speed is the first guess for the next slower one.
     turns: list[Turn] = []
     for speed in map(float, speeds[::-1]):
         turn = periodic_turn(scene, speed, turns[-1] if turns and not turns[-1].message else None)
@@ -354,6 +355,7 @@ def _floquet_table(scene: Scene, speeds: Array) -> modal.FloquetTable:
         modulus = float(np.abs(others).max(initial=0.0))
         is_stable = -1 if turn.message else int(modulus <= 1.0 + modal.GROWTH)
         sizes = np.abs(every)
+        # The product of the multipliers is the exponential of the integrated trace (Liouville).
         rounding = np.finfo(float).eps * np.linalg.norm(turn.transition)
         error = float("nan")  # where rounding leaves under six digits
         if not turn.message and rounding < 1e-6 * sizes.min():

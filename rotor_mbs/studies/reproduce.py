@@ -1,8 +1,8 @@
 """The main job: every scene of the paper by the default methods and with each erratum alone.
 
-And error and run time of all methods on one scene, at a few settings each, in seconds: a bench
-takes one process on one core and rounds over all points; here each curve is a task beside the runs,
-and a point is run once. Its errors are those of a bench, its times are good to a factor.
+Error and run time of all methods on one scene are measured too, at a few settings each, in seconds.
+A bench takes one process on one core and rounds over all points; here each curve is a task beside
+the runs, and a point is run once. Its errors are those of a bench; its times are only approximate.
 """
 
 from __future__ import annotations

@@ -1,5 +1,4 @@
-"""Runs of scenes: solved, judged against the reference of their scene, and stored as rows of a
-results file."""
+"""Runs of scenes: solved, judged against a reference, and stored in a results file."""
 
 from __future__ import annotations
 

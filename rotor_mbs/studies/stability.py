@@ -1,5 +1,8 @@
-"""The stability suite: every corrected method on the stiff and extreme scenes, and ladders of steps
-for some. As a map: how each method ends on every scene, and whether a smaller step helps."""
+"""Stability suite: every corrected method on the stiff and extreme scenes.
+
+Some methods are also run over ladders of steps. The result is a map: how each method ends on every
+scene, and whether a smaller step helps.
+"""
 
 from __future__ import annotations
 
@@ -82,7 +85,7 @@ class SuiteRun:
 
 
 def suite_runs(path: Path) -> list[SuiteRun]:
-    """Return every run of a results file, in its order.
+    """Return every run of the results file at `path`, in its order.
 
     Raises
     ------
@@ -219,6 +222,8 @@ def run_suite(
     }
     made: list[RunOutcome] = []
     with pool_of(workers) as pool:
+        # The patient method first: a run that ended at its longer limit is not computed again with
+        # the shorter one.
         for chosen, limit_s in ((patient, max(timeout_s, _PATIENT_S)), (asked, timeout_s)):
             own = settings_of_any(
                 [name for able in chosen.values() for name in able], settings or {}

@@ -1,5 +1,4 @@
-"""References read from results files: those shipped with the package, and those computed beside the
-runs of a study."""
+"""References read from results files: shipped ones, and those computed in a study."""
 
 from __future__ import annotations
 

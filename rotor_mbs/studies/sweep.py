@@ -1,5 +1,7 @@
-"""Sweeps: the runs of a parameter study, cut into chunks, into one dataset, in worker processes or
-on a cluster."""
+"""Sweeps: the runs of a parameter study, computed into one dataset.
+
+They are divided into chunks, for worker processes or for parts on a cluster.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,4 @@
-"""A sweep's dataset for those who find it without its maker: Croissant, and a folder for
-`datasets`.
+"""Metadata of a sweep's dataset for other users: Croissant, and a folder for `datasets`.
 
     STEM.croissant.json        the variables of the dataset, with types and units
     FOLDER/train.h5 ...        the runs of each split, and FOLDER/README.md, the dataset card, which
