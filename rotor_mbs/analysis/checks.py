@@ -48,8 +48,8 @@ from rotor_mbs.solution.metrics import (
 from rotor_mbs.solution.status import COMPLETE
 from rotor_mbs.solution.trajectory import Solution, Trajectory
 
-# Extremes at ode45's own points, which are others when it starts between: its relative tolerance,
-# of rad or rad/s.
+# Extremes are taken at ode45's own points, which differ when it starts in between: they are equal
+# to its relative tolerance, of rad or rad/s.
 _READ_OFF = 1e-3
 _MOST_INTERVALS = 12  # in which a peak of the printed equations' rate is looked for
 # |ln| of the ratio: the transition matrices of a run's intervals are good to 1e-5 each.
@@ -87,7 +87,7 @@ def checks_of(results: OpenResults, frozen: Sequence[OpenResults], bounds: Bound
                     bounded(own, "integrity", _where(run, "row"), run.is_damaged, "rows", hint)
                 )
                 try:
-                    # Whatever goes wrong with a run that is known to be damaged is that damage.
+                    # Any error in a run that is known to be damaged is due to the damage.
                     with reading(str(scene.name), run.method) if run.is_damaged else nullcontext():
                         faults, solution = run.faults(scene.scene), run.solution(scene.scene)
                         checks += _of_run(
@@ -146,7 +146,7 @@ def _of_run(
     scene = solution.scene
     judgement = judge(scene, solution, reference)
     claimed = bool(run.attributes.get("false_success", 0))
-    # Whether a motion ended in a singularity, its angles and rates alone say.
+    # Whether a motion ended in a singularity can be decided from angles and rates alone.
     is_unknown = run.status == "singular" and not (scene.wants("angles") and scene.wants("rates"))
     wrong = (judgement.status != run.status and not is_unknown) + (
         judgement.false_success != claimed
@@ -241,11 +241,11 @@ def _changed_metric(run: StoredRun, metrics: Metrics, solution: Solution) -> tup
         return channel, worst, hint
     floor = _rounding(metrics)
     growth = min(float(running_growth(trajectory)[-1]), HORIZON_GROWTH)
-    # What the last bits of the samples decide, which other hardware rounds otherwise.
+    # Differences due to the last bits of the samples, which other hardware rounds differently.
     allowances = {name: floor * value.rounding for name, value in METRICS.items() if value.rounding}
     allowances["defect_drift"] *= growth
-    # Proportional to the growth of an error over an interval; without an excess there is no
-    # interval to speak of.
+    # Proportional to the growth of an error over an interval; without an excess the interval is
+    # arbitrary.
     is_beyond = metrics.get("defect_excess", 0.0) > floor
     allowances["defect_allowed"] = (
         _OWN_GROWTH * metrics.get("defect_allowed", 0.0) if is_beyond else math.inf

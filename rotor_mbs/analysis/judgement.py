@@ -40,13 +40,13 @@ from rotor_mbs.solution.trajectory import Integration, Solution, Trajectory
 # A run is checked where one of these could be found.
 _CHECKS = ("energy_drift_max", "defect_max", "angle_error_max")
 
-# A claim of success is not false while a run resembles the motion: a hundredth, of the energy
-# scale, of a radian for an interval's defect, of what a quantity is relative to; and a radian for
-# the angles up to the horizon.
+# A claim of success is not false while a run resembles the motion: its energy drift (of the energy
+# scale), its defects (rad) and the errors of its quantities (relative to their scales) are below a
+# hundredth, and its angle error up to the horizon is below one radian.
 _RESEMBLES = 1e-2
 _RESEMBLING_ANGLE = 1.0
 
-# Of the rotor's inertia at the start: above it, no start is singular.
+# Share of the rotor's inertia at the start: above it no initial state is singular.
 _CLEAR_SHARE = 1e-6
 
 
@@ -86,7 +86,7 @@ def bounds_of(method: str) -> Bounds:
     return shipped_bounds().with_entries(known.bounds if known else ())
 
 
-# of a runaway: what is not finite is judged
+# A run that diverges overflows: numbers that are not finite are judged, too.
 @np.errstate(over="ignore", invalid="ignore", divide="ignore")
 def judge(scene: Scene, run: Solution, reference: Trajectory | None) -> Judgement:
     """Return the status of a run, its numbers, and whether its report of success is false.
@@ -200,7 +200,7 @@ def _status(
     bounds : by which the checks are judged.
     """
     scene, trajectory, metrics = run.scene, run.trajectory, run.metrics
-    # Runs that did not reach the end, or that their engine calls failed.
+    # Runs that did not reach the end, or whose engine reports a failure.
     samples = len(trajectory.time)
     if samples != scene.samples or not integration.success:
         reached = (
@@ -245,7 +245,7 @@ def _status(
             "",
         )
 
-    # The table that `check` reads; of several that fail the first names the reason.
+    # The same checks as those of `check`; the first one that fails gives the reason.
     for check in run_checks(run, bounds):
         if not check.passed:
             lost = check.name == "error" and symmetry_loss(run) is not None
@@ -256,7 +256,7 @@ def _status(
             )
             return "inaccurate", check.message, advice
 
-    # Complete runs of which not everything could be judged.
+    # Complete runs that could only be judged in part.
     angle = float(np.abs(trajectory.angles).max())
     if angle > ANGLE_LIMIT:
         limit = f"above {ANGLE_LIMIT:.0e} rad double precision is not sufficient"

@@ -186,8 +186,7 @@ def modes_of(
             single, key=lambda k: float(_assurance(shapes[last][None], shapes[k][None])[0, 0])
         )
         single.remove(partner)
-        # The growing one first, in every model: modes are recognized by their first eigenvalue,
-        # too.
+        # The growing one first, in every model: `in_order_of` compares first eigenvalues, too.
         growing, decaying = sorted((values[last], values[partner]), key=lambda value: -value.real)
         pairs.append(((growing, decaying), shapes[partner]))
     modes = ModeSet(
@@ -333,9 +332,9 @@ AGREEMENT = 1e-8
 PRINTED_PRECISION = 1e-6
 _NOTE_WIDTH = 130  # characters, of a summary's lines: as wide as its table
 _SHOWN_ROWS = 24  # of a summary: three states of eight modes
-# Eigenvalues below this share of the largest are not compared: they are roots of what is left when
-# stiffnesses cancel, and of a rotor that nothing holds that is rounding. Their residuals are, which
-# no root magnifies.
+# Eigenvalues below this share of the largest are not compared themselves: they are square roots of
+# the small difference of stiffnesses, which is rounding where nothing holds the rotor. Their
+# residuals are compared, which no root magnifies.
 _SLOW = 1e-3
 # Share of the equations' terms below which a singular vector counts as a shape of an eigenvalue.
 _NO_FORCE = 1e-10
@@ -606,7 +605,7 @@ def mode_rows(modes: SceneModes) -> list[dict[str, object]]:
         state = "at rest" if linear.kind == REST else "steady rotation without gravity"
         for i, speed in enumerate(linear.speeds.tolist()):
             for k, name in enumerate(linear.names):
-                # None for what JSON has no number for.
+                # JSON has no NaN and no infinity: None in their place.
                 shown = {
                     key: float(a[i, k]) if math.isfinite(a[i, k]) else None
                     for key, a in numbers.items()

@@ -34,20 +34,19 @@ from rotor_mbs.solution.quantities import (
 from rotor_mbs.solution.status import OK_ERROR
 from rotor_mbs.solution.trajectory import Trajectory
 
-# Below this share of the rotor's inertia the last bit of a pitch decides it: (π/2 known to 1e-16)²,
-# a hundredfold.
+# Below this share of the rotor's inertia the last bit of a pitch decides its value: a hundred times
+# the square of the 1e-16 to which π/2 is known.
 NO_INERTIA = 1e-30
-# Share of the rotor's inertia that is left once every pitch is free: below this a run that broke
-# off broke off there.
+# Share of the rotor's inertia that is left once every pitch is free: if it is below this where a
+# run broke off, the singularity is the reason.
 SINGULAR_SHARE = 1e-3
-# Round-off of a run's state, what it becomes over some hundred steps; magnified it may add to the
-# energy error.
+# Round-off of a run's state after some hundred steps; magnified it may add to the energy error.
 _ROUND_OFF = 1e-14
 # Ten units in the last place of an angle that starts turns away from zero are no error of the
 # method.
 _START_ROUND_OFF = 10.0 * float(np.finfo(float).eps)
-# Steps of a run: an error that is this many times the largest defect has not only been added up,
-# but has grown.
+# About the number of intervals of a run: an error that is more than this many times the largest
+# defect is not only their sum, but has been amplified.
 _GROWN = 1e4
 
 
@@ -247,8 +246,8 @@ def _checks_of_energies(run: RunSamples, bounds: Bounds) -> Iterator[Check]:
             off = float(np.abs(stored - own).max()) / scale
             check = bounded(bounds, "energies", run.where(name), off, "of scale", hint)
             if name == "work" and not is_built_in(run.method):
-                # Not a function of the state alone where it is integrated with the motion: then it
-                # is as accurate as the balance of energy.
+                # Work that is integrated with the motion is no function of the state alone: it is
+                # only as accurate as the balance of energy.
                 check = replace(
                     check, bound=max(check.bound, bounds.of("energy", run.method).value)
                 )
@@ -285,8 +284,8 @@ def _checks_of_motion(run: RunSamples, bounds: Bounds) -> Iterator[Check]:
         fault = _error_fault(run, metrics["angle_error_max"], "angle error")
         yield _with_fault(bounded(bounds, "error", run.where("angles"), error, "rad", hint), fault)
     elif "angle_error_predicted" in metrics:
-        # Without a reference the defects say how large the error is; bounds of shipped scenes are
-        # for the true one.
+        # Without a reference the error is predicted from the defects; bounds of shipped scenes do
+        # not apply to it, as they are for the true error.
         error, where = metrics["angle_error_predicted"], run.where("angles, predicted")
         value, fault = (
             max(error - start_slack(scene), 0.0),

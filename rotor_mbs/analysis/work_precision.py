@@ -20,8 +20,8 @@ ANGLE_ERROR = "angle_error_max"  # up to the horizon, rad
 # An error as large as the motion itself: such a run is a failure, not a point on the curve.
 USELESS_RAD = 1.0
 
-# Below this many roundings of a double of order one an error of exactly zero is drawn and
-# interpolated.
+# Errors below this, far under the rounding of a double of order one, are drawn and interpolated as
+# this value: zero has no logarithm.
 SMALLEST_ERROR = 1e-17
 # A curve turns into its round-off floor gradually: errors within this factor of the floor carry no
 # order.
@@ -147,8 +147,8 @@ def fitted_order(steps: Array, errors: Array) -> float | None:
     h, e = steps[usable], errors[usable]
     if len(e) < 2:
         return None
-    # Whether the errors stop falling: an earlier one is the smallest, or the last slope is clearly
-    # below the usual.
+    # Errors stop falling at a round-off floor: the smallest is not the last one, or the last slope
+    # is clearly below the median. Points near the floor are then left out.
     slopes = np.diff(np.log(e)) / np.diff(np.log(h))
     if int(np.argmin(e)) < len(e) - 1 or bool(slopes[-1] < 0.75 * np.median(slopes)):
         above = e > _ABOVE_FLOOR * e.min()

@@ -28,21 +28,20 @@ from numpy.typing import NDArray
 from rotor_mbs.solution.status import OK_ERROR
 from rotor_mbs.solution.trajectory import Array, Trajectory
 
-# What the rounding of a run's own numbers makes of a defect, as it is estimated, may be this many
-# times larger.
+# The true effect of rounding on a defect may be this many times its estimate.
 FLOOR_SAFETY = 3.0
-# s, the interval for which bounds are given: in n of them the errors of a method add up, each grown
-# by at most G.
+# s, the interval for which bounds are given: over n such intervals the errors of a method add up,
+# each grown by at most G.
 _BOUND_INTERVAL = 0.01
-# rad, below any number that a defect can be told from.
+# rad, below any defect that can be distinguished from zero.
 _SMALLEST_FLOOR = 1e-18
-# rad: a pitch that should stay zero has left it when it is past this: ten million times above
+# rad: a pitch that should stay zero has left it when it exceeds this: ten million times the
 # round-off of a radian, far below what a plot shows.
 LEFT_ZERO = 1e-9
-# Rows over which defects are added up, to show a drift that every one of them hides.
+# Rows over which defects are added up, to show a drift that is not visible in single defects.
 DRIFT_ROWS = 100
-# Intervals whose matrices are worked on at once: of a run of a million samples all of them would
-# take gigabytes.
+# Intervals whose matrices are processed at once: all those of a run of a million samples would take
+# gigabytes.
 BLOCK_ROWS = 40 * DRIFT_ROWS
 
 
@@ -355,7 +354,7 @@ class Defects:
         errors[0] = self.states[0] - self.start
         for block in _blocks(len(self.angles)):
             matrices, offsets = self.transitions[block].copy(), -self._vectors[block]
-            # Of a pitch that should be zero the error is known: it is the state.
+            # The error of a pitch that should be zero is known: it is the state itself.
             matrices[:, at_zero] = 0.0
             offsets[:, at_zero] = self.states[1:][block][:, at_zero]
             row = block.start
@@ -422,7 +421,7 @@ def _carried(matrices: Array, offsets: Array, rows: int) -> tuple[Array, Array]:
     steps, added = steps.reshape(stretches, rows, m, m), added.reshape(stretches, rows, m)
     products, errors = np.empty((stretches, 1 + rows, m, m)), np.zeros((stretches, 1 + rows, m))
     products[:, 0] = np.eye(m)
-    # The loop is over the rows of a stretch, not over all intervals: a step does all stretches.
+    # The loop is over the rows of a stretch, not over all intervals: each step does all stretches.
     for row in range(rows):
         products[:, row + 1] = steps[:, row] @ products[:, row]
         errors[:, row + 1] = np.einsum("kij,kj->ki", steps[:, row], errors[:, row]) + added[:, row]

@@ -25,7 +25,7 @@ from rotor_mbs.solution.quantities import (
 )
 from rotor_mbs.solution.trajectory import Trajectory
 
-# a scene's horizon: when an error of the initial state may have grown this many times
+# At the horizon of a scene an error of the initial state may have grown this many times.
 HORIZON_GROWTH = 1e5
 
 Metrics = dict[str, float]
@@ -157,8 +157,8 @@ METRICS = {
     "pitch_max": RowValue("rad", "largest magnitude of a pitch angle", "sweep", is_main=True),
 }
 
-# rad: beyond it a double's last digit is above 1e-10 rad, and neither its sine nor an error of 1e-9
-# rad means anything.
+# rad: beyond it a double's last digit is above 1e-10 rad, so that neither its sine nor an error of
+# 1e-9 rad is meaningful.
 ANGLE_LIMIT = 1e6
 
 # rad: between these the departure grows exponentially; below is round-off, above the motion is no
@@ -266,12 +266,12 @@ def metrics_of(
             metrics |= _angle_errors(run, reference, until)
     if defects is not None:
         metrics |= defect_metrics(defects, metrics.get("horizon_s"), is_corrected=is_corrected)
-    # Of the rotor over the integrator's own output points, where the run has them.
+    # Extremes of the rotor over the integrator's own output points, where the run has them.
     own = run.refined or run
     metrics["rotor_angle_min"] = float(own.angles[:, 0].min())
     metrics["rotor_angle_max"] = float(own.angles[:, 0].max())
     metrics["rotor_rate_max"] = float(np.abs(own.rates[:, 0]).max())
-    # of a quantity: its largest size, the time of it in s, and the blade, from 1
+    # of each quantity: its largest size, the time of that in s, and the blade, from 1
     peaks: Metrics = {}
     for quantity in known_quantities(scene.outputs):
         values = array_of(quantity, scene, run) if quantity.has_peak else None
@@ -367,8 +367,8 @@ def _angle_errors(run: Trajectory, reference: Trajectory, until: int) -> Metrics
     """
     error = angle_error(run, reference)
     metrics: Metrics = {}
-    # Pitches that are exactly zero in the reference: whether they stayed so, and if not, when and
-    # how fast they left.
+    # Pitches that are exactly zero in the reference: whether they stay zero, and if not, when and
+    # how fast they leave it.
     zero = [i for i in range(1, reference.angles.shape[1]) if not reference.angles[:, i].any()]
     if zero:
         away = np.abs(run.angles[:, zero]).max(axis=1)

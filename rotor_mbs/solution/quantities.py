@@ -319,7 +319,7 @@ _JOINT_GAP = QuantityMetric(
     look_at="a joint of the chain that is not constrained, or its marker",
 )
 
-# Found by the judgement of a run, and not by its model.
+# Computed by the judgement of a run, not by its model.
 DEFECT = "defect"
 
 BUILT_IN = (

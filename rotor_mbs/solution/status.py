@@ -10,9 +10,10 @@ import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-# Those that a run's state can have ("unchecked": complete, with nothing to judge it by;
-# "completed": the printed equations at their end, of which nothing is claimed), a point of which no
-# run was made, and a run whose process died. Codes are places in this list: new ones go to its end.
+# Outcomes of a run ("unchecked": complete, but it cannot be judged; "completed": a run of the
+# printed equations that reached the end, whose accuracy is not judged), of a point that was not run
+# ("left_out"), and of a run whose process died. Codes are places in this list: new ones go to its
+# end.
 STATUSES = (
     "ok",
     "inaccurate",
@@ -28,11 +29,11 @@ STATUSES = (
 # Those of runs that reached the end.
 COMPLETE = ("ok", "inaccurate", "unchecked", "completed")
 
-# In place of a status: the run was not made, as its method cannot represent the scene. Nothing is
+# In place of a status: there is no run, as its method cannot represent the scene; nothing is
 # stored.
 REFUSED = "refused"
 
-# Those that nobody has to look at: "ok" may be acted on, and of a "completed" run no more is asked.
+# Statuses that need no attention: an "ok" run is accurate, a "completed" one can be no better.
 GOOD = ("ok", "completed")
 
 

@@ -53,17 +53,17 @@ BENCH = "bench"
 
 LONG_RUN_S = 0.5  # runs longer than this are repeated LONG_REPEATS times at most
 LONG_REPEATS = 5
-# Of the budget, what the warm-up runs may take before expensive rungs are left out, so that there
-# is time for about two rounds; and what warm-ups and building may take together.
+# Shares of the budget: what the warm-up runs may take before expensive rungs are left out, so that
+# there is time for about two rounds; and what warm-ups and building may take together.
 _WARM_UP_SHARE, _BUILD_SHARE = 0.3, 0.6
 _REFERENCE_LIMIT_S = 60.0
-# A run longer than this is ended: a hanging engine must not eat the budget of the others.
+# A run longer than this is ended: a hanging engine must not use up the budget of the others.
 _RUN_LIMIT_S = 10.0
-# A process that has taken this many times its budget, and some time to load engines, hangs in one
-# of them.
+# A process that has taken this many times its budget, and some time to load engines, is considered
+# to hang in one of them.
 _HANGING, _LOADING_S = 3.0, 60.0
-# Errors are compared on at most so many sample intervals: more would make every step shorter than a
-# coarse rung's, and a bench would time the reading of samples.
+# Errors are compared on at most so many sample intervals: with more, every step would be shorter
+# than that of a coarse rung, and a bench would time the output of samples.
 _MOST_INTERVALS = 100
 
 
@@ -220,8 +220,8 @@ class PointTimer:
                     self._setup[name] = self._clock() - begun
                 if not gc.isenabled():
                     gc.collect()
-                # A limit makes engines ask after every step, which takes time: only the warm-up run
-                # of a bench has one.
+                # With a limit engines check the time after every step, which takes time: only the
+                # warm-up run of a bench has one.
                 with time_limit(self._warm_up_limit_s):
                     self.warm_s = self.run()
                 if self._integration.out_of_time:
@@ -278,7 +278,7 @@ class PointTimer:
         del self._solver
         status = judgement.status
         return {
-            # those of a run that broke off are of its part
+            # metrics of a run that broke off would be those of its first part
             **(judgement.metrics if status in COMPLETE else {}),
             "status": status,
             "message": judgement.message,
@@ -366,7 +366,7 @@ def _warm_all(
         ladder[rung].warm_up()
         warm_s += ladder[rung].warm_s
         if rung + 1 < len(ladder):
-            # The next one's time is this one's, grown as from the one before it, at least doubled.
+            # The next rung is expected to take longer by the same factor as this one, 2 to 10.
             last, before = ladder[rung].warm_s, ladder[rung - 1].warm_s if rung else 0.0
             growth = last / before if before > 0.0 else 2.0
             heapq.heappush(waiting, (last * min(max(growth, 2.0), 10.0), rung + 1, number))
@@ -470,8 +470,8 @@ def coarsened(scene: Scene) -> tuple[Scene, int]:
         ),
         1,
     )
-    # A number of intervals without a fitting divisor would leave too few samples to see an error's
-    # largest.
+    # A number of intervals without a suitable divisor would leave too few samples to find the
+    # largest error.
     k = k if intervals // k >= _MOST_INTERVALS // 5 or intervals <= _MOST_INTERVALS else 1
     return replace(scene, samples=intervals // k + 1), k
 
@@ -614,7 +614,7 @@ def run_bench(
         failed = {
             run.label.partition(" ")[0]: run for run in (*report.failures, *report.not_computed)
         }
-        # whose reference is another one now
+        # scenes whose reference was computed again: their curves are measured again
         changed = {run.label.partition(" ")[0] for run in report.computed}
         curves: list[Curve] = []
         refused: list[catalogue.Refusal] = []

@@ -213,7 +213,8 @@ def _value(value: object, indent: int = 4) -> str:
     return "[" + ", ".join(items) + "]"
 
 
-# By format: the ending of the file's name; its text; what is found in every such text.
+# For each format the ending of the file's name, the function that returns the text, and a pattern
+# that every such text contains.
 FORMATS: dict[str, tuple[str, Callable[[Scene], str], bytes]] = {
     "mjcf": (
         ".xml",

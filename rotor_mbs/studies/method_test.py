@@ -107,9 +107,9 @@ def leaning_blades() -> Scene:
     )
 
 
-# Shipped scenes beside it, with durations in s that show each at work, samples, and how many times
-# its bounds, which are for slow motions, a method may need: stiff bearings take more of a fixed
-# step.
+# Further shipped scenes, each with a duration in s that shows its effect, the number of samples,
+# and a factor of a method's bounds, which are for slow motions: stiff bearings are harder for a
+# fixed step.
 SCENES = {
     "check/held": (0.5, 26, 1.0),  # blades without inertia about their pitch axis
     "check/point-masses": (1.0, 51, 1.0),  # blades without inertia of their own
@@ -189,7 +189,7 @@ class _Examination:
         self._bound = defect_bound(self._bounds, method.name)
         self._made: list[Check] = []
         self._refused: set[str] = set()
-        # Of the first scene that fails by its defects; None as long as there is none.
+        # Whether the first scene that fails by its defects has faults at a time; None until then.
         self._has_faults_in_time: bool | None = None
 
     def checks(self) -> list[Check]:
@@ -203,7 +203,8 @@ class _Examination:
         )
         scenes = [(five_blades(), 1.0), (leaning_blades(), 1.0)]
         for name, (duration, samples, allowance) in SCENES.items():
-            # The chaotic one has its own outputs: bounds on loads are for scenes that ask for them.
+            # The chaotic scene keeps its outputs: bounds on loads are for scenes that request
+            # them.
             outputs = only_scene(name).outputs if name == _SMOOTH else OUTPUTS
             scenes.append(
                 (
@@ -329,10 +330,11 @@ class _Examination:
             rows = wrong_rows(scene, run, defects)
             reason = rows or self._cause(scene, run, defects)
         for name, check in worst.items():
-            # what the defects add up to: of a motion that grows, they alone are the method's
+            # The error is the sum of the defects: where a motion amplifies it, only they are due to
+            # the method.
             if name == "error":
                 continue
-            # Loads are known as well as the accelerations, which the defects are of.
+            # Loads are as accurate as the accelerations, whose errors are the defects.
             bound = check.bound * (allowance if name in ("defect", "energy", "loads") else 1.0)
             hint = check.hint
             if reason and name in ("defect", "defect median"):
@@ -388,13 +390,13 @@ class _Examination:
                 faults = f"{NOT_FOUND}: {faults}"
         except RotorError:
             faults = ""
-        # Wrong equations leave the same at any step: what shrinks is the scheme's.
+        # Defects of wrong equations are the same at any step: those that shrink are the scheme's.
         by_order = ""
         if order >= 1.0 - _ORDER_BAND:
             look_at = "the scheme's coefficients, or loads of another time within a step"
             by_order = f"order {order:.1f} where {claimed:g} is expected: {look_at}"
-        # The first scene that fails moves in all its intervals. In one that rests most of the time
-        # whatever is wrong would look like a fault at a time.
+        # The first scene that fails decides, as it moves in all its intervals. In a scene that
+        # rests most of the time any error would look like a fault at a time.
         if self._has_faults_in_time is None:
             self._has_faults_in_time = bool(faults)
         return (faults if self._has_faults_in_time else by_order) or NOT_FOUND
@@ -431,8 +433,8 @@ class _Examination:
         name, angle = known
         fault = protocol_fault(solution)
         error = np.inf if fault else np.abs(solution.angles[:, 0] - angle).max()
-        # The defects of all intervals, added up; the pendulum falls, in a second by less than
-        # tenfold.
+        # The sum of the defects of all intervals; errors of the falling pendulum grow less than
+        # tenfold in a second.
         bound = 10.0 * scene.samples * self._bound
         self._add("exact", scene.name, error, bound, fault or f"{name}, solved analytically", "rad")
 
@@ -530,7 +532,7 @@ def _wrong_output(scene: Scene, run: Trajectory, check: Check) -> str:
     if check.name == "energies":
         text = wrong_energy(scene, run, channel)
     else:
-        # They have their names in the text.
+        # The text of wrong loads has their names.
         if text := wrong_loads(scene, run):
             return text
         channel = channel.replace("_", " ")
@@ -577,7 +579,7 @@ def protocol_fault(solution: Solution) -> str:
         np.diff(run.angles, axis=0)
         - 0.5 * (run.rates[1:] + run.rates[:-1]) * np.diff(times)[:, None]
     )
-    # Rates in another unit differ from the angles' by a turn somewhere, too, but not all at once.
+    # Rates in a wrong unit give such differences, too, but in neighbouring intervals as well.
     beside = np.full((1, turned.shape[1]), 0.0)
     before, after = np.vstack([beside, turned[:-1]]), np.vstack([turned[1:], beside])
     is_single = np.maximum(np.abs(before), np.abs(after)) < 1.0

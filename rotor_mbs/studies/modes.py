@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 # A source whose accelerations at the steady state are above this share of its largest stiffness is
 # not steady there.
 _STEADY = 1e-7
-# Share of what the weights would do if they did not balance, which is rounding in every model
+# Share of the stiffness of the weights, if they did not balance, that is rounding in every model
 # (finite differences).
 _STIFFNESS_ROUNDING = 1e-9
 _BALANCED = "balanced rotor: no preferred angle; modes taken at the initial angle"
@@ -204,7 +204,7 @@ def _linear(
     if not steady:
         notes.append(str(points[0]))
         return {}
-    # All blades and bearings are equal, stand at equal pitches, and no gravity tells them apart.
+    # All blades and bearings are equal, have equal pitches, and no gravity distinguishes them.
     bearings = (
         scene.bearing_stiffness,
         scene.bearing_damping,
@@ -308,7 +308,8 @@ def _steady_states(scene: Scene, kind: str, speeds: Array) -> list[_Point | str]
     from rotor_mbs.models.lagrange.linearization import equilibrium, holding_torque, steady_rotation
 
     at = scene if kind == modal.REST else replace(scene, gravity=0.0)
-    # of each slower speed: the pitches before, so that one branch is followed down to rest
+    # The pitches at a speed are the initial guess at the next slower one, so that one branch is
+    # followed down to rest.
     start = scene
     points: list[_Point | str] = []
     for speed in map(float, speeds[::-1]):

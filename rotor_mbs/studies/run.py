@@ -274,8 +274,8 @@ def missing_runs(
         place = file.place(run.label)
         row = place.read()
         status = STATUSES[row["status"][0]] if place.is_stored else ""
-        # A shipped reference may end early itself; it has a limit only where reading it was over
-        # one.
+        # A shipped reference that ended early has no time limit stored, unless reading it took too
+        # long.
         limit = row["time_limit_s"][0]
         is_short = limit < timeout_s if run.is_shipped else not limit >= timeout_s
         is_over = status == "timed_out" and is_short
@@ -297,8 +297,8 @@ def missing_runs(
                 method=run.method,
                 place=place,
                 reference=reference,
-                # What ends itself at its time limit needs a while before, to load its engine and
-                # compile, and to write after.
+                # A run that ends itself at its time limit also needs time to load its engine and
+                # compile before, and to write its row after.
                 kill_after_s=1.2 * timeout_s + 10.0,
                 work=work_of(run.scene, run.method),
                 asked=run,

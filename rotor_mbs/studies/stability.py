@@ -40,8 +40,8 @@ from rotor_mbs.studies.run import run_scenes
 
 TARGET = 1e-6  # rad: what a method must reach on the stiff and light scenes
 
-# What the map shows of a run: its status, or one that says more. Symbol, text; colour is the
-# report's.
+# Outcomes in the map: the status of a run, or a more specific one, with its symbol and text. The
+# report chooses the colours.
 OUTCOMES = {
     "ok": ("✓", "ok"),
     "smaller_step": ("▾", "ok with a smaller step"),
@@ -150,15 +150,15 @@ def suite_table(runs: Sequence[SuiteRun]) -> TextTable:
 
 SUITE = ("stiff", "extreme")
 
-# The method that `run` relies on is given time for the longest scenes: a map of time-outs shows
-# nothing.
+# The method that `run` relies on is given enough time for the longest scenes: a map of time-outs
+# shows nothing.
 _PATIENT_METHOD, _PATIENT_S = "lagrange/taylor", 120.0
 # A ladder takes a few times its longest run; what is over this is stuck.
 _TASK_LIMIT_S = 40.0
 STEPS = "stability"  # table
 
-# A ladder goes down by fours until it reaches the target, stops gaining, or a run is expected to
-# take this long.
+# Each step of a ladder is a quarter of the one before, until the error is well below the target, or
+# a run is expected to take this long.
 _FACTOR = 4
 _LONGEST_RUN_S = 1.5
 _STIFF_OR_LIGHT = ("stiff/", "extreme/light", "extreme/feather")
@@ -277,7 +277,7 @@ def complete_ladders(
     ]
     curves = [ladder_curve(scene, method) for scene, method in wanted]
     with locked(output), pool_of(workers) as pool:
-        # Ladders of these scenes and methods that the runs no longer call for go.
+        # Ladders of these scenes and methods that the runs no longer need are removed.
         replaced = [(STEPS, scene, method) for scene, able in methods.items() for method in able]
         file = fit_file_to_request(output, curve_tables(curves), replaced)
         missing = [curve for curve in curves if not curve.is_stored(file)]

@@ -94,7 +94,8 @@ class Chunk(Task):
         except TableError as error:
             keys, last = ", ".join(self.variants.keys), self.first + len(self.values) - 1
             raise InputError(f"runs {self.first} to {last}: {keys}: {error}") from error
-        # Runs side by side have what is asked for, or it follows from their samples.
+        # Runs can be computed side by side if `solve_many` computes all requested quantities, or
+        # they follow from the samples.
         asked = quantities(scenes[0].outputs)
         is_there = all(
             known.output in _SIDE_BY_SIDE or known.producer or not known.required for known in asked
@@ -110,7 +111,7 @@ class Chunk(Task):
                 except OutOfTimeError as exc:
                     each.append(self.part(i, i + 1).failed("timed_out", str(exc)))
             rows = {name: np.concatenate([row[name] for row in each]) for name in each[0]}
-        # of the motion, from the variational equations of the closed form, by any method
+        # For any method the growth is that of the closed form, from its variational equations.
         if "error_growth" in rows:
             for i, scene in enumerate(scenes):
                 angles = np.empty((scene.samples, 0))
@@ -211,8 +212,8 @@ def _side_by_side(chunk: Chunk, scenes: Sequence[Scene]) -> Rows:
     errors = energy_balance(kinetic, found["potential_energy"], work)
     drifts = energy_drifts(scenes, kinetic, work, errors)
     angles = largest(found["angles"].reshape(len(scenes), -1))
-    # What decides whether a run is clearly ok. Without defects it is the energy: runs side by side
-    # are the closed form itself, and their defects cost ten times as much as they do.
+    # Metrics that decide whether a run is clearly ok. Without defects it is the energy alone: runs
+    # side by side are the closed form itself, and their defects cost ten times as much as the runs.
     of_runs: list[Metrics] = []
     for i, scene in enumerate(scenes):
         defects = defects_of(scene, block.trajectory(i)) if chunk.with_defects else None
@@ -227,7 +228,7 @@ def _side_by_side(chunk: Chunk, scenes: Sequence[Scene]) -> Rows:
     for name in row.names or ():
         if name not in rows:
             values = errors if name == "energy_error" else block.quantities.get(name)
-            # what a plug-in's quantity makes of each run; NaN after a run broke off
+            # quantities of plug-ins are computed run by run; NaN after a run broke off
             if values is None:
                 runs = enumerate(scenes)
                 made = [
@@ -264,9 +265,9 @@ def _side_by_side(chunk: Chunk, scenes: Sequence[Scene]) -> Rows:
     return rows
 
 
-# Runs handed to a worker at once where the method computes many side by side: by the fastest one an
-# eighth of a second of work, fewer towards the end, so that all workers end together. The least
-# fills the lanes of any processor.
+# Number of runs in a chunk where the method computes many side by side: an eighth of a second of
+# work by the fastest one, fewer towards the end, so that all workers end together. The smallest
+# number fills the vector lanes of any processor.
 _MAX_RUNS = 128
 _MIN_RUNS = 8
 _CHUNK_BYTES = 1 << 23

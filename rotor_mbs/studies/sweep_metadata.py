@@ -25,7 +25,7 @@ from rotor_mbs.runs.trailer import SPLIT_OF, may_extend
 from rotor_mbs.scenario.sweep import SPLITS
 from rotor_mbs.solution.status import STATUSES
 
-# What is found in every file of a kind, by which an earlier output is known.
+# Patterns that every file of a kind contains, by which an earlier output is recognized.
 _CROISSANT = rb'"conformsTo": "http://mlcommons.org/croissant/1.0"[^\0]*"Euler-Lagrange equations"'
 _CARD = rb"\A---\npretty_name: [^\0]*Euler-Lagrange equations"
 _TEMPLATES = jinja2.Environment(
