@@ -270,7 +270,13 @@ def _status(
 
 
 def _too_far_apart(defects: Defects, count: int) -> str:
-    """Return why a defect of more than 0.01 rad would not be seen in some intervals."""
+    """Return why a defect of more than 0.01 rad would not be seen in some intervals.
+
+    Parameters
+    ----------
+    defects : of the run; the interval with the largest error growth is named.
+    count : number of these intervals.
+    """
     unseen = np.where(defects.is_judged, 0.0, defects.growth)
     worst = int(unseen.argmax())
     length = float(defects.time[worst + 1] - defects.time[worst])

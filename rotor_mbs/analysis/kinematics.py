@@ -84,6 +84,11 @@ def work_of_constant_loads(scene: Scene, angles: Array) -> Array | None:
     """Return the work of the loads, (n,) J; None where it is no function of the angles.
 
     That is where a load changes, or there is damping.
+
+    Parameters
+    ----------
+    scene : its torques and initial angles are used.
+    angles : (n, 1 + blades) rad, rotor first.
     """
     if scene.has_damping or not scene.has_constant_loads:
         return None

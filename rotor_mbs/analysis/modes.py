@@ -123,7 +123,9 @@ def multiblade(blades: int) -> tuple[tuple[str, ...], Array]:
 def multiblade_shapes(shapes: Complex) -> Complex:
     """Return amplitudes of rotor and multiblade coordinates, (..., 1 + blades).
 
-    They are computed from `shapes`, the amplitudes of rotor and pitches, (..., 1 + blades).
+    Parameters
+    ----------
+    shapes : (..., 1 + blades) amplitudes of rotor and pitches.
     """
     _, matrix = multiblade(shapes.shape[-1] - 1)
     pitches = np.einsum("cb,...b->...c", np.linalg.inv(matrix), shapes[..., 1:])
@@ -237,7 +239,9 @@ def isotropic_modes(stiffness: Array, damping: Array) -> ModeSet:
 def track(sets: Sequence[ModeSet]) -> list[ModeSet]:
     """Put the same modes in the same places at every speed.
 
-    Each set is put in the order of the one before it.
+    Parameters
+    ----------
+    sets : one for each speed; each is put in the order of the one before it.
     """
     out = list(sets[:1])
     for each in sets[1:]:
@@ -272,8 +276,11 @@ def whirl_frequencies(
 ) -> tuple[Array, Array]:
     """Return the backward and forward whirl frequencies in rad/s, as the base sees them.
 
-    They are those of a cosine and sine mode of `frequency` in the rotor's frame, at rotor speed
-    `speed` (both rad/s); `harmonic` is the number k of the coordinates cosine_k and sine_k.
+    Parameters
+    ----------
+    frequency : rad/s, of a cosine and sine mode in the rotor's frame.
+    speed : rad/s, of the rotor.
+    harmonic : number k of the coordinates cosine_k and sine_k.
     """
     return np.abs(frequency - harmonic * speed), frequency + harmonic * speed
 
@@ -403,9 +410,14 @@ class LinearModes(ModeSet):
         return float(np.linalg.norm(force) / (np.linalg.norm(shape) * self._terms(i, value)))
 
     def shapes_of(self, i: int, value: complex) -> Complex:
-        """Return all shapes of an eigenvalue (1/s) at speed number i, one in each row.
+        """Return all shapes of an eigenvalue, one in each row.
 
         They are computed from the whole matrices.
+
+        Parameters
+        ----------
+        i : number of the speed.
+        value : 1/s, the eigenvalue.
         """
         n = len(self.coordinates)
         _, sizes, vectors = np.linalg.svd(
@@ -534,9 +546,9 @@ class SceneModes:
 
     @property
     def faults(self) -> list[str]:
-        """Return a line for each model whose modes do not satisfy its own equations as printed.
+        """Return a line for each model whose modes do not satisfy its own equations.
 
-        The residual may be at most PRINTED_PRECISION.
+        Their residual is above PRINTED_PRECISION.
         """
         lines = []
         for model, residual in self.residuals.items():

@@ -218,7 +218,13 @@ def _checks_of_outputs(run: RunSamples, bounds: Bounds) -> Iterator[Check]:
 
 
 def _with_fault(check: Check, fault: str, scale: float = 1.0) -> Check:
-    """Return the check with a fault whose field {bound} is filled in, times `scale`."""
+    """Return the check with a fault whose field {bound} is filled in.
+
+    Parameters
+    ----------
+    check, fault : the check, and its message.
+    scale : by which the bound is multiplied in the message, to have its unit.
+    """
     return replace(check, fault=fault.format(bound=f"{check.bound * scale:.0e}"))
 
 
@@ -399,15 +405,23 @@ def defect_bound(bounds: Bounds, method: str) -> float:
 def defect_allowed(metrics: Metrics, bound: float) -> float:
     """Return the defect beyond rounding (rad) that is allowed in the worst interval.
 
-    That is the one whose `defect_judged` is in `metrics`; `bound` is that of the method for 0.01 s,
-    rad.
+    Parameters
+    ----------
+    metrics : have the defect_judged and defect_excess of that interval.
+    bound : rad, of the method for 0.01 s.
     """
     judged, excess = metrics.get("defect_judged", 0.0), metrics.get("defect_excess", 0.0)
     return bound * (excess / judged) if 0.0 < judged < math.inf else bound
 
 
 def quantity_bound(rule: QuantityMetric, bounds: Bounds, method: str) -> float | None:
-    """Return the largest value of a quantity that passes; None where it is not checked."""
+    """Return the largest value of a quantity that passes; None where it is not checked.
+
+    Parameters
+    ----------
+    rule : names a check, or has a bound of its own.
+    bounds, method : where the bound of that check is looked up.
+    """
     entry = bounds.find(rule.check, method) if rule.check else None
     return entry.value if entry else rule.bound
 

@@ -125,7 +125,13 @@ def time_to_reach(errors: Array, seconds: Array, target: float) -> float | None:
 
 
 def fastest(curves: Sequence[Record], target: float) -> list[tuple[Record, Reach]]:
-    """Return the curves that reach the target, the fastest first."""
+    """Return the curves that reach an error, the fastest first.
+
+    Parameters
+    ----------
+    curves : records of a bench.
+    target : rad.
+    """
     times = [(curve, time_to_reach(*points(curve), target)) for curve in curves]
     able = sorted(
         ((curve, time) for curve, time in times if time is not None), key=lambda pair: pair[1]
@@ -180,7 +186,13 @@ def step_for(target: float, steps: Array, errors: Array) -> float | None:
 
 
 def values_of(curves: Iterable[Record], column: str) -> list[float]:
-    """Return the finite values of a column over the points on these curves."""
+    """Return the finite values of a column over the points on some curves.
+
+    Parameters
+    ----------
+    curves : records of a bench; those without the column are left out.
+    column : name of the column.
+    """
     values = [curve.arrays[column][succeeded(curve)] for curve in curves if column in curve.arrays]
     return [value for array in values for value in array.tolist() if math.isfinite(value)]
 

@@ -195,6 +195,10 @@ def angle_error(run: Trajectory, reference: Trajectory) -> Array:
     """Return the largest error of the angles over the coordinates, (common samples,) rad.
 
     Angles are unwrapped: a lost turn is an error of 2π.
+
+    Parameters
+    ----------
+    run, reference : samples at the same times; either may end early.
     """
     n = min(len(run.time), len(reference.time))
     return np.asarray(np.abs(run.angles[:n] - reference.angles[:n]).max(axis=1))
@@ -336,16 +340,23 @@ def defect_metrics(
 def worst_interval(defects: Defects, *, is_corrected: bool = True) -> int:
     """Return the number of the interval that is furthest beyond its bound.
 
-    It is that with the largest defect if none exceeds rounding, or if `is_corrected` is false.
+    Parameters
+    ----------
+    defects : of the run; if none exceeds rounding, the largest defect decides.
+    is_corrected : if false, the largest defect decides, too.
     """
     judged = defects.judged_sizes if is_corrected else np.zeros(1)
     return int(judged.argmax()) if judged.any() else int(defects.sizes.argmax())
 
 
 def interval_metrics(defects: Defects, interval: int, *, is_corrected: bool = True) -> Metrics:
-    """Return the end of an interval, and its excess and judged value if `is_corrected`.
+    """Return the metrics of one interval; those of the worst one are stored with the run.
 
-    Of the worst interval these are stored with the run.
+    Parameters
+    ----------
+    defects : of the run.
+    interval : number of the interval, from 0.
+    is_corrected : whether excess and judged value are added to its end.
     """
     metrics = {"defect_time": float(defects.time[1 + interval])}
     if is_corrected:

@@ -538,9 +538,12 @@ def arrays(scene: Scene, samples: Trajectory) -> dict[str, Array]:
 
 
 def sizes(quantity: Quantity, values: Array) -> Array:
-    """Return the magnitudes of an array of this quantity.
+    """Return the magnitudes of an array of a quantity.
 
-    With the last dimension `axis` they are the lengths of the vectors.
+    Parameters
+    ----------
+    quantity : if its last dimension is `axis`, lengths of vectors are returned.
+    values : (n, ...) in its unit.
     """
     lengths: Array = (
         np.linalg.norm(values, axis=-1) if quantity.dimensions[-1] == "axis" else np.abs(values)

@@ -150,7 +150,14 @@ class RunBlock:
         )
 
     def end(self, i: int, integration: Integration, samples: int) -> None:
-        """Truncate run i to a number of samples; later values are set to NaN."""
+        """End run i after a number of samples; later values are set to NaN.
+
+        Parameters
+        ----------
+        i : number of the run.
+        integration : its report; the time reached is set in it.
+        samples : number of samples that are kept.
+        """
         if samples < self.time.shape[1]:
             for values in self.quantities.values():
                 values[i, samples:] = np.nan

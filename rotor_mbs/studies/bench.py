@@ -91,7 +91,7 @@ class Curve:
 
     Attributes
     ----------
-    scene : the scene.
+    scene : with all its samples, of which a bench uses a part.
     name : the method's name, with its fixed settings where they are not the default ones.
     kind : STEP or TOLERANCE.
     points : one for each setting, coarse to fine.

@@ -127,7 +127,12 @@ class RunTask(Task):
 def work_of(scene: Scene, method: str) -> float:
     """Return a rough measure of how much there is to compute, to share runs among processes.
 
-    The integration of 10 s of a scene by the fastest method counts as 1.
+    The integration of 10 s of a scene by the fastest method counts as 1; a constant for building,
+    judging and storing is added.
+
+    Parameters
+    ----------
+    scene, method : what is run.
     """
     return _FIXED_WORK + find_method(method).relative_cost * scene.duration / 10.0
 

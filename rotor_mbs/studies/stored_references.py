@@ -78,7 +78,13 @@ def _digest(path: Path) -> str:
 
 
 def read_reference(place: RowLocation, scene: Scene) -> Trajectory | None:
-    """Return the reference of `scene` at a place of a results file; None if missing or empty."""
+    """Return the reference of a scene in a results file; None if missing or empty.
+
+    Parameters
+    ----------
+    place : location of its row.
+    scene : gives the sample times and the quantities that are computed.
+    """
     row = place.read()
     samples = int(row["samples"][0])
     if int(row["status"][0]) == MISSING or samples <= 0:

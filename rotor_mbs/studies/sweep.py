@@ -153,8 +153,12 @@ class Chunk(Task):
 def limit_of(runs: int, time_limit_s: float) -> float:
     """Return the time in s after which the worker process of a number of runs is ended.
 
-    It is `time_limit_s` for each of the `runs`, as a method may compute them one after the other,
-    and a while to store them.
+    A method may compute them one after the other; some time to store them is added.
+
+    Parameters
+    ----------
+    runs : number of runs.
+    time_limit_s : s, of each run.
     """
     return time_limit_s * runs + _GRACE_S
 
