@@ -48,8 +48,8 @@ from rotor_mbs.solution.metrics import (
 from rotor_mbs.solution.status import COMPLETE
 from rotor_mbs.solution.trajectory import Solution, Trajectory
 
-# Extremes are taken at ode45's own points, which differ when it starts in between: they are equal
-# to its relative tolerance, of rad or rad/s.
+# Extremes are taken at ode45's own points, which differ when it starts in between: they agree
+# within its relative tolerance, of rad or rad/s.
 _READ_OFF = 1e-3
 _MOST_INTERVALS = 12  # in which a peak of the printed equations' rate is looked for
 # |ln| of the ratio: the transition matrices of a run's intervals are good to 1e-5 each.
@@ -180,7 +180,7 @@ def _of_run(
 
 
 def _of_stored_interval(run: StoredRun, judgement: Judgement) -> Metrics:
-    """Return the numbers of the stored worst interval, if it is as far beyond its bound.
+    """Return the metrics of the interval stored as the worst, if it may be the worst one.
 
     Of several nearly equal intervals the last bits of the samples decide which one is the worst,
     and other hardware rounds them otherwise. Where the stored one is clearly less far beyond its

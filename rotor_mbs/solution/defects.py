@@ -142,7 +142,10 @@ class Defects:
 
     @functools.cached_property
     def growth(self) -> Array:
-        """Return the error growth over each interval, (n - 1,)."""
+        """Return the error growth over each interval, (n - 1,).
+
+        It is the largest entry of the transition matrix, with the rates in `rate_units`.
+        """
         growth: Array = np.empty(len(self.angles))
         with np.errstate(all="ignore"):
             for rows in _blocks(len(growth)):
@@ -153,7 +156,7 @@ class Defects:
     def channel_excess(self) -> Array:
         """Return the defects beyond rounding of the moving coordinates, (n - 1, m) rad.
 
-        inf where a defect is not finite.
+        They are infinite where a defect is not finite.
         """
         sizes = self.channel_sizes
         with np.errstate(invalid="ignore"):

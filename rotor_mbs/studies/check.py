@@ -99,8 +99,8 @@ def check_default_set(
     """Compute the default set of runs in a temporary file, and return their checks.
 
     The set is every scene of the paper by the default methods, and the scenes made for checking by
-    every corrected method; or all of these scenes by the `methods` that are named, where they can
-    represent them.
+    every corrected method that is installed; or all of these scenes by the `methods` that are
+    named, where they can represent them.
 
     Parameters
     ----------
@@ -292,11 +292,11 @@ def judged_runs(checks: Iterable[Check]) -> Counter[str]:
 
 
 def regressions(new: Sequence[Check], old: Sequence[Check]) -> list[Check]:
-    """Return a check for each earlier one: by what factor its margin has shrunk, at most ten.
+    """Return a check for each earlier one: by what factor its margin has shrunk.
 
-    There is also a check for each run that is missing now. The value is NaN, which fails, where
-    `new` lacks the check or the run, and infinite where a check that passed fails. What failed
-    before and fails now is no regression.
+    A factor above ten fails. There is also a check for each run that is missing now. The value is
+    NaN, which fails, where `new` lacks the check or the run, and infinite where a check that passed
+    fails. What failed before and fails now is no regression.
 
     Parameters
     ----------

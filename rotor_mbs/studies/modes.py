@@ -84,9 +84,10 @@ def modes_of_scenes(
     Raises
     ------
     InputError
-        For a negative or repeated speed, and for a method that is not linearized.
+        For speeds that do not increase or are negative, for a method that is not linearized, and if
+        `output` holds another kind of results.
     StoreError
-        If `output` cannot be written, or is a file of another kind.
+        If `output` cannot be written, or was not written by this program.
     """
     models = tuple(find_method(name).model for name in names)
     for name, model in zip(names, models, strict=True):
