@@ -378,9 +378,9 @@ def increasing_speeds(speeds: Sequence[float] | Array) -> list[float]:
     Raises
     ------
     InputError
-        If they do not increase, or one is negative or out of range.
+        If they do not increase, or one is negative, out of range or a text without a number.
     TypeError
-        If one of `speeds` is not a number.
+        If one of `speeds` cannot be converted at all, such as None.
     """
     try:
         numbers = [float(speed) for speed in speeds]
