@@ -1,4 +1,4 @@
-"""What can go wrong, as typed errors that carry what was being done. Knows nothing of the rest."""
+"""Define the typed errors of the package; this module imports nothing else of it."""
 
 from __future__ import annotations
 
@@ -9,14 +9,21 @@ from contextlib import contextmanager
 
 
 class RotorError(Exception):
-    """Base class of the errors that this package raises. The message has one line per error."""
+    """Base class of the errors that this package raises.
+
+    The message has one line per error.
+    """
 
 
 class InputError(RotorError):
-    """Raised for invalid input. One line per error: file, line, key, what is wrong, what is
-    allowed.
+    """Raised for invalid input.
 
-    The command line prints the lines and ends with exit status 2.
+    The message has one line per error: file, line, key, what is wrong, what is allowed. The command
+    line prints the lines and ends with exit status 2.
+
+    Attributes
+    ----------
+    problems : the lines.
     """
 
     def __init__(self, problems: str | Iterable[str]) -> None:
@@ -27,8 +34,10 @@ class InputError(RotorError):
 
 
 class MethodRefusal(RotorError):
-    """Raised if a method cannot represent a scene or is not installed. The message says what is
-    allowed."""
+    """Raised if a method cannot represent a scene or is not installed.
+
+    The message says what is allowed.
+    """
 
 
 class ResourceError(RotorError):
@@ -40,8 +49,10 @@ SYSTEM_ERRORS = (MemoryError, OSError, ImportError, ResourceError)
 
 
 class StoreError(RotorError):
-    """Raised if a results file cannot be read or written. The message has the file and the
-    reason."""
+    """Raised if a results file cannot be read or written.
+
+    The message has the file and the reason.
+    """
 
 
 class PlausibilityWarning(UserWarning):
@@ -50,8 +61,7 @@ class PlausibilityWarning(UserWarning):
 
 @contextmanager
 def system_errors_apart(*others: type[Exception]) -> Iterator[None]:
-    """Raise one of SYSTEM_ERRORS in the block for every error that the system causes, whatever its
-    type.
+    """Raise one of SYSTEM_ERRORS for every error in the block that the system causes.
 
     A library that cannot be loaded may raise any error (NumPy a ValueError for an invalid
     SOURCE_DATE_EPOCH), and an engine may replace an error of the system by one of its own. Neither
@@ -59,8 +69,8 @@ def system_errors_apart(*others: type[Exception]) -> Iterator[None]:
 
     Parameters
     ----------
-    *others : types of errors that may be raised at any point, also during an import, and pass as
-    they are.
+    *others : types of errors that may be raised at any point, also during an import, and are passed
+        on unchanged.
 
     Raises
     ------
@@ -123,14 +133,18 @@ def printable(text: str) -> str:
 
 
 def one_line(error: BaseException) -> str:
-    """The type of an exception and the first line of its text."""
+    """Return the type of an exception and the first line of its text."""
     text = str(error).strip().splitlines()
     return f"{type(error).__name__}: {text[0] if text else 'no message'}"
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
-    """ ", perhaps NAME" with the one of `known` that a misspelt `name` may mean, or "" where none
-    is near.
+    """Return ", perhaps NAME" for the known name that is most similar, or "" if none is.
+
+    Parameters
+    ----------
+    name : a name that may be misspelt; its first 80 characters are used.
+    known : the names; the part of each after its last "/" may stand for it.
 
     >>> names = ["lagrange/taylor", "lagrange/radau"]
     >>> nearest("tailor", names), nearest("euler", names[:1])

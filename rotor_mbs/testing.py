@@ -1,5 +1,4 @@
-"""For the tests of other projects: a trajectory of theirs must agree with the reference of a
-scene."""
+"""Check in the tests of other projects that a trajectory agrees with a scene's reference."""
 
 from __future__ import annotations
 
@@ -20,8 +19,9 @@ def assert_agrees(
     rates: Any = None,
     tolerance: float = 1e-6,
 ) -> DataComparison:
-    """Raise AssertionError, with the table of the comparison, if a trajectory does not agree with a
-    scene.
+    """Raise AssertionError if a trajectory does not agree with the reference of a scene.
+
+    Its message is the table of the comparison.
 
     Parameters
     ----------

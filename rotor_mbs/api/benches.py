@@ -31,18 +31,23 @@ def bench(
     budget: float = 28.0,
     progress: bool | None = None,
 ) -> BenchCurves:
-    """Measure the error of methods against their run time, each over its ladder of steps or
-    tolerances.
+    """Measure the error of methods against their run time, over a ladder of settings.
+
+    The ladder of a method has several time steps or tolerances.
 
     Parameters
     ----------
     scene : a Scene, the name of a shipped scene, or a TOML file.
     methods : names of methods, or paths of Python files; by default all that have a ladder.
-    output : file of the curves; what it has is not measured again. Default: a temporary file, which
-        is removed with the last object that refers to it.
-    repeats : number of timed runs of each point, at most; 1 or more.
+    output : file of the curves; those that it already has are not measured again. Default: a
+        temporary file, which is removed with the last object that refers to it.
+    repeats : largest number of timed runs of each point; 1 or more.
     budget : time for all curves (s).
     progress : whether to show the progress. By default on a terminal and in a notebook.
+
+    Returns
+    -------
+    BenchCurves
 
     Raises
     ------
@@ -98,9 +103,9 @@ def bench(
 
 
 class BenchCurves(Mapping[str, Mapping[str, Any]]):
-    """Curves of error against run time in a file of `rotor-mbs bench`: arrays by "scene/curve", a
-    value per setting.
+    """Curves of error against run time: a mapping from "scene/curve" to its arrays.
 
+    They are in a file of `rotor-mbs bench`. An array has one value per setting:
     `curves["paper/fig11/exudyn_tree/rk67"]["angle_error_max"]` (rad), `["run_time_s"]` (s),
     `["setting"]`: a time step in s or a tolerance.
     """
@@ -122,12 +127,14 @@ class BenchCurves(Mapping[str, Mapping[str, Any]]):
         return len(self._records)
 
     def table(self) -> TextTable:
-        """Table with a row per curve: the smallest error (rad), and the run time (s) at which
-        errors are reached."""
+        """Return a table with a row per curve.
+
+        It has the smallest error (rad), and the run time (s) at which errors are reached.
+        """
         return bench_table(list(self._records.values()))
 
     def to_html(self, folder: str | os.PathLike[str]) -> Path:
-        """Write the page into a folder. Returns its path."""
+        """Write the page into a folder, and return its path."""
         from rotor_mbs.report.build import write_report  # late: templates
 
         return write_report(self.path, file_path(folder))
@@ -139,6 +146,6 @@ class BenchCurves(Mapping[str, Mapping[str, Any]]):
         return f"<p>{escape(self._headline())}</p>{self.table()._repr_html_()}"
 
     def _headline(self) -> str:
-        """Return what it holds, with the file where that is the user's."""
+        """Return the number of curves, after the path of the file unless it is temporary."""
         place = f"{self.path}: " if self._folder is None else ""
         return f"{place}{counted(len(self), 'curve')} of error against run time"

@@ -18,7 +18,9 @@ from rotor_mbs.scenario.toml_file import file_path
 
 
 class Checks(Sequence[Check]):
-    """Verdicts, each a number against its bound. Prints those that fail, then counts.
+    """A sequence of checks, each a number against its bound.
+
+    Its text has a table of those that failed, and the counts.
 
     Attributes
     ----------
@@ -31,10 +33,12 @@ class Checks(Sequence[Check]):
 
     @property
     def passed(self) -> bool:
+        """Return whether all checks passed."""
         return not self.failures
 
     @property
     def failures(self) -> tuple[Check, ...]:
+        """Return the checks that did not pass."""
         return tuple(check for check in self._checks if not check.passed)
 
     @overload
@@ -48,8 +52,11 @@ class Checks(Sequence[Check]):
         return len(self._checks)
 
     def table(self) -> TextTable:
-        """Table with a row per check: what was checked where, the value, what is allowed, and what
-        to look at."""
+        """Return a table with a row per check.
+
+        It has what was checked, in which run, the value, the bound, and the probable reason of a
+        failure.
+        """
         return _table(self._checks)
 
     def __repr__(self) -> str:

@@ -105,7 +105,10 @@ def compare(
 
 
 def open_comparisons(path: Path) -> DataComparison | dict[str, DataComparison]:
-    """Return the comparison in a file; of several ones, by scene and name. Raises StoreError."""
+    """Return the comparison in a file, or a dict by "scene/name" if it has several.
+
+    Raises StoreError if the file has none or cannot be read.
+    """
     found = {}
     for record in read_records(path, COMPARISON):
         with reading(path):
@@ -137,12 +140,14 @@ class DataComparison:
         self.agrees, self.likely = self.verdict.agrees, self.verdict.likely
 
     def table(self) -> TextTable:
-        """Table with a row per channel: errors (rad, rad/s), end of agreement (s)."""
+        """Return a table with a row per channel: errors (rad, rad/s), end of agreement (s)."""
         return channel_table(self.verdict)
 
     def plot(self) -> Panels:
-        """Plot the defects of each coordinate over time and the tolerance; without defects, the
-        errors."""
+        """Plot the defects of each coordinate over time with the tolerance.
+
+        Errors are plotted where there are no defects.
+        """
         # late: matplotlib
         from rotor_mbs.report.pages.comparison import defect_panels, error_panels
 
@@ -171,7 +176,7 @@ class DataComparison:
         return xarray.Dataset(variables, attrs={"scene": record.scene} | facts)
 
     def to_html(self, folder: str | os.PathLike[str]) -> Path:
-        """Write the page into a folder. Returns its path."""
+        """Write the page into a folder, and return its path."""
         from rotor_mbs.report.files import write_page  # late: templates
         from rotor_mbs.report.pages.comparison import comparison_page
 
@@ -188,7 +193,7 @@ class DataComparison:
         return target
 
     def __repr__(self) -> str:
-        """Say how columns were read, numbers by channel, and the verdict."""
+        """Return how columns were read, the numbers by channel, and the verdict, as text."""
         verdict = self.verdict
         lines = [
             (

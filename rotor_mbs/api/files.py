@@ -1,4 +1,4 @@
-"""`rm.open`: any file that the program wrote."""
+"""Open any file that the program wrote: `rm.open`."""
 
 from __future__ import annotations
 

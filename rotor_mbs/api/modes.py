@@ -32,17 +32,20 @@ if TYPE_CHECKING:
 
 
 def modes(scene: Scene | str | os.PathLike[str], speeds: Sequence[float] = ()) -> Modes:
-    """Compute natural frequencies, damping ratios and mode shapes of a scene with every model that
-    can be linearized.
+    """Compute natural frequencies, damping ratios and mode shapes of a scene.
 
-    Modes at rest under gravity, and over `speeds` in steady rotation without gravity (Campbell
-    diagram); Floquet multipliers in rotation under gravity. The scene's torque is not included: a
-    drive torque maintains the speed.
+    They are computed with every model that can be linearized: at rest under gravity, and over
+    `speeds` in steady rotation without gravity (Campbell diagram); with Floquet multipliers in
+    rotation under gravity. The scene's torque is not included: a drive torque maintains the speed.
 
     Parameters
     ----------
     scene : a Scene, the name of a shipped scene, or a TOML file.
     speeds : rotor speeds (rad/s), increasing, at least 0.
+
+    Returns
+    -------
+    Modes
 
     Raises
     ------
@@ -64,7 +67,10 @@ def modes(scene: Scene | str | os.PathLike[str], speeds: Sequence[float] = ()) -
 
 
 def open_modes(path: Path) -> Modes | dict[str, Modes]:
-    """Return the modes of the scene of a file; of several scenes, by name. Raises StoreError."""
+    """Return the modes in a file, or a dict by scene if it has several scenes.
+
+    Raises StoreError if the file cannot be read.
+    """
     found = {name: Modes(**vars(modes)) for name, modes in read_modes(path).items()}
     return found if len(found) > 1 else next(iter(found.values()))
 
@@ -80,29 +86,38 @@ class Modes(SceneModes):
     floquet : Floquet multipliers under gravity; None if not computed.
     notes : results that could not be computed, with the reason.
     agrees, disagreement : whether the modes of the models agree and satisfy their own equations,
-        and the largest
-        difference of a frequency or a decay rate, relative to the largest eigenvalue.
-    residuals, faults : by model, what its modes leave of its own linearized equations; lines where
-        that is too much.
+        and the largest difference of a frequency or a decay rate, relative to the largest
+        eigenvalue.
+    residuals, faults : by model, the residuals of its modes in its own linearized equations; a line
+        for each that is too large.
     plot : `modes.plot()` draws the Campbell diagram; `.damping()`, `.multipliers()`.
     """
 
     @property
     def plot(self) -> ModePlots:
+        """Return the plots of the modes; called, it draws the Campbell diagram."""
         from rotor_mbs.report.pages.modes import ModePlots  # late: matplotlib
 
         return ModePlots(self)
 
     def table(self) -> TextTable:
-        """Table with a row per state, speed and mode of the closed form: rad/s, damping ratio,
-        1/s."""
+        """Return a table with a row per state, speed and mode of the closed form.
+
+        Frequencies are in rad/s, decay rates in 1/s; damping ratios have no unit.
+        """
         return mode_table(mode_rows(self))
 
     def to_xarray(self, state: str = "rotation") -> Any:
-        """Return the modes of one state, "rotation" or "rest", as an xarray.Dataset; dimension
-        `solver`: the models.
+        """Return the modes of one state as an xarray.Dataset; its dimension `solver` is the model.
 
-        Raises InputError for another state, and one that was not computed.
+        Parameters
+        ----------
+        state : "rotation" or "rest".
+
+        Raises
+        ------
+        InputError
+            For another state, and one that was not computed.
         """
         states = {"rotation": self.rotation, "rest": self.rest}
         if state not in states:
@@ -122,7 +137,7 @@ class Modes(SceneModes):
         return target
 
     def to_html(self, folder: str | os.PathLike[str]) -> Path:
-        """Write the page into a folder. Returns its path."""
+        """Write the page into a folder, and return its path."""
         from rotor_mbs.report.files import write_page  # late: templates
         from rotor_mbs.report.pages.modes import modes_page
 

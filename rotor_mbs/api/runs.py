@@ -1,4 +1,4 @@
-"""Runs and sweeps in Python: `rm.run`, `rm.sweep`, and what they return."""
+"""Run scenes and parameter studies in Python: `rm.run`, `rm.sweep`, and what they return."""
 
 from __future__ import annotations
 
@@ -59,8 +59,16 @@ _SHOWN = 5  # lines of lost runs
 
 
 def scenes(folder: str = "") -> list[str]:
-    """List the names of the shipped scenes, or of those in one folder. Raises InputError if there
-    is no such folder.
+    """List the names of the shipped scenes, or of those in one folder.
+
+    Parameters
+    ----------
+    folder : name of a folder, such as "paper"; by default all.
+
+    Raises
+    ------
+    InputError
+        If there is no such folder.
 
     Examples
     --------
@@ -95,7 +103,7 @@ def scene(name: str) -> Scene:
 
 
 def load(path: str | os.PathLike[str]) -> Scene:
-    """Read a scene from a TOML file. Its name is that of the file.
+    """Read a scene from a TOML file; its name is that of the file.
 
     Implausible numbers, such as 30 rad, cause a PlausibilityWarning. Raises InputError with one
     line per error in the file, TypeError if `path` is neither text nor a path.
@@ -250,10 +258,10 @@ class Run(Solution):
 
     @property
     def defects(self) -> Defects | None:
-        """Interval defects: the closed form integrated from each sample to the next, minus the
-        run's next sample.
+        """Compute the interval defects of the run; None if they cannot be computed.
 
-        None for fewer than two samples, or without angles and rates.
+        The closed form is integrated from each sample to the next, and the run's next sample is
+        subtracted. This needs two samples or more, with angles and rates.
 
         Examples
         --------
@@ -266,6 +274,7 @@ class Run(Solution):
 
     @property
     def plot(self) -> RunPlots:
+        """Return the plots of the run; called, it draws the motion."""
         from rotor_mbs.report.plots import RunPlots  # late: matplotlib
 
         return RunPlots(self, self.reference)
@@ -322,15 +331,17 @@ def sweep(
     progress: bool | None = None,
     **options: object,
 ) -> Runs:
-    """Run a parameter study: simulate a scene for all combinations of parameter values, into one
-    dataset.
+    """Run a parameter study: simulate a scene for all combinations of parameter values.
+
+    All runs are stored in one dataset.
 
     Parameters
     ----------
     scene : a Scene, the name of a shipped scene, or a TOML file.
     parameters : for each key of a number in a scene file, such as "bearing.stiffness" or
-        "initial.angles[1]", a list
-        of values or a table as in an [[axis]] of a sweep file, such as `{"uniform": [0.0, 1.0]}`.
+        "initial.angles[1]", a list of values or a table as in an [[axis]] of a sweep file, such as
+        `{"uniform": [0.0, 1.0]}`.
+    methods : name of a method, or a list of names; or Python files that define methods.
     output : file of the dataset. A repeated call continues it after an interruption. Default: a
         temporary file.
     workers : number of worker processes; 0: everything runs in this process.
@@ -339,7 +350,12 @@ def sweep(
         versions.
     progress : whether to show the progress. By default on a terminal and in a notebook.
     **options : other keys of a sweep file: samples, outputs, draws, seed, combine, validation,
-    settings, ...
+        settings, ...
+
+    Returns
+    -------
+    Runs
+        By run number.
 
     Raises
     ------
@@ -392,23 +408,26 @@ def sweep(
 
 
 def texts(values: Iterable[str]) -> list[str]:
-    """Return the texts of a list, or of anything that can be gone through once. Raises TypeError
-    for anything else."""
+    """Return the texts of an iterable as a list; raise TypeError for an entry that is no text."""
     listed = list(values)
     "".join(listed)  # refuses an entry that is no text
     return listed
 
 
 def refuse_losses(lost: Sequence[str]) -> None:
-    """Raise ResourceError where runs were asked for and could not be computed; a line each, of the
-    first ones."""
+    """Raise ResourceError if requested runs could not be computed.
+
+    Parameters
+    ----------
+    lost : a line for each such run; the message has the first of them.
+    """
     if lost:
         more = [f"... ({len(lost)} in all)"] if len(lost) > _SHOWN else []
         raise ResourceError("\n".join([*lost[:_SHOWN], *more]))
 
 
 class TemporaryFolder:
-    """A folder that goes with the last object that refers to it."""
+    """A temporary folder that is removed with the last object that refers to it."""
 
     def __init__(self) -> None:
         self.path = Path(tempfile.mkdtemp(prefix="rotor_mbs-"))
@@ -416,7 +435,7 @@ class TemporaryFolder:
 
 
 class Runs(Mapping[Any, Any]):
-    """Runs of a file: a mapping from label to `Run`. A run is read on access.
+    """A mapping from label to `Run`, for the runs of a file; a run is read on access.
 
     Labels are method names (and "reference") for one scene, "paper/fig11/lagrange/taylor" for a
     file with several scenes, and run numbers for a sweep. `runs["paper/fig11"]` returns the runs of
@@ -442,6 +461,18 @@ class Runs(Mapping[Any, Any]):
         *,
         _folder: TemporaryFolder | None = None,
     ) -> None:
+        """Read the labels of the runs.
+
+        Parameters
+        ----------
+        path, scene : see the class.
+        _folder : the temporary folder of the file, which is kept as long as these runs.
+
+        Raises
+        ------
+        StoreError
+            If the file cannot be read, or has no such scene.
+        """
         self.path, self.scene, self._folder = file_path(path), os.fsdecode(scene), _folder
         self._is_sweep = is_sweep(self.path)
         self._labels: dict[Any, tuple[str, str]] = {}  # scene and method by label, in this order
@@ -460,8 +491,10 @@ class Runs(Mapping[Any, Any]):
                     self._labels[method if self.scene else f"{name}/{method}"] = name, method
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Return how it is copied or unpickled: with a file of its own in place of a temporary
-        one."""
+        """Return the arguments of `_restored`, for a copy or a pickle.
+
+        The content of a temporary file is among them, so that the copy has a file of its own.
+        """
         return _restored, (
             self.path,
             self.scene,
@@ -469,8 +502,19 @@ class Runs(Mapping[Any, Any]):
         )
 
     def __getitem__(self, label: Any) -> Any:
-        """Return runs or a run by label. Raises KeyError for what the file does not have,
-        StoreError for samples that cannot be read."""
+        """Return the run with a label, or the runs of a scene.
+
+        Parameters
+        ----------
+        label : see the class; of one scene also with the name of the scene before the method.
+
+        Raises
+        ------
+        KeyError
+            If the file has no such run.
+        StoreError
+            If its samples cannot be read.
+        """
         # "paper/fig11/lagrange/taylor", as in a file of several scenes
         if self.scene and isinstance(label, str):
             label = label.removeprefix(f"{self.scene}/")
@@ -501,13 +545,14 @@ class Runs(Mapping[Any, Any]):
 
     @property
     def scenes(self) -> list[str]:
-        """Names of the scenes, in the order of the file; of a sweep that of its base scene."""
+        """Return the names of the scenes in the order of the file; for a sweep its base scene."""
         if self._is_sweep:
             return [str(self._sweep.attributes["base_scene"])]
         return list(dict.fromkeys(scene for scene, _ in self._labels.values()))
 
     @functools.cached_property
     def statuses(self) -> dict[str, int]:
+        """Return the number of stored runs with each status."""
         if self._is_sweep:
             codes = self._sweep.column("status").tolist()
             return dict(Counter(STATUSES[code] for code in codes if code != MISSING))
@@ -515,7 +560,7 @@ class Runs(Mapping[Any, Any]):
 
     @functools.cached_property
     def _sweep(self) -> StoredSweep:
-        """Read a sweep whole once, to verify it."""
+        """Read and verify the dataset of a sweep, once."""
         return StoredSweep(self.path)
 
     def _runs(self) -> Iterator[StoredRun]:
@@ -524,8 +569,11 @@ class Runs(Mapping[Any, Any]):
                 yield from scene.runs.values()
 
     def table(self) -> TextTable:
-        """Table with a row per run: status, error (rad), energy drift (relative to the energy
-        scale), run time (s)."""
+        """Return a table with a row per run, or for a sweep with a row per status.
+
+        A run has its status, error (rad), energy drift (relative to the energy scale) and run time
+        (s).
+        """
         if self._is_sweep:
             counts: list[tuple[str, ...]] = [
                 (status, str(count)) for status, count in self.statuses.items()
@@ -540,6 +588,10 @@ class Runs(Mapping[Any, Any]):
 
     @property
     def plot(self) -> ComparisonPlots:
+        """Return the plots of the runs of one scene.
+
+        Raises InputError for several scenes or a sweep.
+        """
         from rotor_mbs.report.plots import ComparisonPlots  # late: matplotlib
 
         if self._is_sweep:
@@ -555,7 +607,9 @@ class Runs(Mapping[Any, Any]):
 
     def column(self, name: str) -> Any:
         """Return an array of a sweep, (runs, ...), such as "status", "pitch_max" or "angles".
-        Raises StoreError."""
+
+        Raises StoreError if the sweep has no such array.
+        """
         return np.array(self._sweep.column(name))
 
     def at(self, name: str, sample: int) -> Any:
@@ -637,7 +691,7 @@ class Runs(Mapping[Any, Any]):
         return target
 
     def to_html(self, folder: str | os.PathLike[str]) -> Path:
-        """Write the report pages into a folder. Returns the path of the index."""
+        """Write the report pages into a folder, and return the path of the index."""
         from rotor_mbs.report.build import write_report  # late: templates
 
         return write_report(self.path, file_path(folder))
@@ -660,15 +714,20 @@ class Runs(Mapping[Any, Any]):
 
     @functools.cached_property
     def _scene_label(self) -> str:
-        """Return the scene and what was changed in a shipped one; "" of several scenes, and of a
-        sweep."""
+        """Return the scene's name with the changes to a shipped one.
+
+        It is "" for several scenes and for a sweep.
+        """
         if self._is_sweep or not self.scene:
             return ""
         with open_results(self.path, only=[self.scene]) as results:
             return results.scenes[self.scene].label
 
     def _short_table(self) -> TextTable:
-        """Return a table for a screen: of many runs a row per method, of a sweep its parameters."""
+        """Return a table for a screen.
+
+        With many runs it has a row per method, for a sweep its parameters.
+        """
         if self._is_sweep:
             return sweep_parameters(self._sweep)
         if len(self) <= MOST_ROWS:
@@ -689,7 +748,7 @@ def _restored(path: Path, scene: str, content: bytes | None) -> Runs:
 
 
 def _labelled(data: Any) -> Any:
-    """Return a dataset whose coordinates and axes have their names in place of numbers."""
+    """Return a dataset whose coordinates and axes have names instead of numbers."""
     labels = {}
     if "coordinate" in data.coords:
         labels["coordinate"] = list(np.atleast_1d(data.coordinate.attrs["labels"]))
@@ -699,7 +758,7 @@ def _labelled(data: Any) -> Any:
 
 
 def _loaded(scene: Scene, stored: StoredRun, reference: Trajectory | None) -> Run:
-    """Return a run as it was stored. Raises StoreError."""
+    """Return a stored run as a `Run`. Raises StoreError if its arrays cannot be used."""
     solution = stored.solution(scene)
     if solution is None:
         raise StoreError(f"{stored.scene}/{stored.method}: {'; '.join(stored.faults(scene))}")

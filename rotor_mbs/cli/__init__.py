@@ -1,7 +1,7 @@
-"""The command line: runs a command, and turns errors and interrupts into its exit status.
+"""Run a command of the command line, and turn errors and interrupts into its exit status.
 
-Standard output and standard error are plain: a title or a message that comes from a file may have
-escape sequences, and a closed standard error must not end a batch.
+Control characters in standard output and standard error are escaped, as a title or a message that
+comes from a file may contain escape sequences. A closed standard error does not end a command.
 """
 
 from __future__ import annotations
@@ -42,10 +42,16 @@ _received_signals: list[int] = []  # that this call was to end by
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run a command: the words after `rotor-mbs`, by default those of this process.
+    """Run a command, and return its exit status.
 
-    Returns 0 done and all well; 1 done, but a check failed or a run did not succeed; 2 bad input;
-    130 interrupted.
+    Parameters
+    ----------
+    argv : the words after `rotor-mbs`; by default those of this process.
+
+    Returns
+    -------
+    int
+        0 success; 1 a check failed or a run did not succeed; 2 bad input; 130 interrupted.
     """
     if argv is not None:
         return _run(list(argv))
@@ -63,7 +69,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _end_process(status: int) -> NoReturn:
-    """End this process without a SystemExit, after what has to be done at its exit."""
+    """End this process without a SystemExit, after its exit functions have run."""
     atexit._run_exitfuncs()
     for stream in (sys.stdout, sys.stderr):
         with suppress(AttributeError, OSError, ValueError):
@@ -72,7 +78,12 @@ def _end_process(status: int) -> NoReturn:
 
 
 def _run(words: list[str]) -> int:
-    """Run a command and return the exit status."""
+    """Run a command, and return its exit status.
+
+    Parameters
+    ----------
+    words : the command and its arguments.
+    """
     with plain_streams(), _without_invalid_date():
         try:
             with _signals_as_interrupts(), warnings.catch_warnings(), system_errors_apart():
@@ -117,8 +128,10 @@ def _run(words: list[str]) -> int:
 
 
 def _prepare_reading(arguments: argparse.Namespace) -> None:
-    """Start the process that reads a file of this program, if one is named, while the command's
-    code is loaded."""
+    """Start the process that reads the file named in the arguments, if it is one of this program.
+
+    It starts while the command's code is loaded.
+    """
     name = getattr(arguments, "file", None) or getattr(arguments, "scene", None)
     if not isinstance(name, str | os.PathLike):
         return
@@ -133,8 +146,10 @@ def _prepare_reading(arguments: argparse.Namespace) -> None:
 
 @contextmanager
 def _without_invalid_date() -> Iterator[None]:
-    """Ignore a SOURCE_DATE_EPOCH that is no number in the block: a part of NumPy would not load,
-    and SciPy with it."""
+    """Remove a SOURCE_DATE_EPOCH that is no number from the environment in the block.
+
+    With it, a part of NumPy could not be loaded, nor SciPy.
+    """
     date = os.environ.get("SOURCE_DATE_EPOCH")
     if date is None or date.isdecimal():
         yield
@@ -147,7 +162,7 @@ def _without_invalid_date() -> Iterator[None]:
 
 
 def _print_warning(message: Warning | str, category: type[Warning], *where: Any, **_: Any) -> None:
-    """Print a warning: doubts about numbers of a file in a line, others as Python shows them."""
+    """Print a warning: implausible numbers of a file in one line, others as Python shows them."""
     is_doubt = issubclass(category, PlausibilityWarning)
     text = (
         f"warning: {message}" if is_doubt else warnings.formatwarning(message, category, *where[:2])
@@ -156,8 +171,10 @@ def _print_warning(message: Warning | str, category: type[Warning], *where: Any,
 
 
 def _is_interrupt(error: BaseException) -> bool:
-    """Return whether an error is an interrupt: inside compiled code, or while it loads, that
-    becomes another error, or its cause."""
+    """Return whether an error was caused by an interrupt.
+
+    Inside compiled code, or while it is loaded, an interrupt becomes another error, or its cause.
+    """
     cause: BaseException | None = error
     while cause is not None:
         if isinstance(cause, KeyboardInterrupt):
@@ -168,8 +185,10 @@ def _is_interrupt(error: BaseException) -> bool:
 
 @contextmanager
 def _signals_as_interrupts() -> Iterator[None]:
-    """End the block as Ctrl-C does on SIGTERM, which a cluster sends before it kills, and on
-    SIGHUP, of a terminal that is closed."""
+    """Raise KeyboardInterrupt in the block on SIGTERM and SIGHUP, as on Ctrl-C.
+
+    A cluster sends SIGTERM before it kills a process, a terminal that is closed SIGHUP.
+    """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -179,8 +198,10 @@ def _signals_as_interrupts() -> Iterator[None]:
         raise KeyboardInterrupt
 
     def interrupt_again(unraisable: sys.UnraisableHookArgs) -> None:
-        """Repeat an interrupt that came where Python ignores exceptions, as in a weak reference's
-        callback, a moment later."""
+        """Repeat an interrupt a moment later if Python ignored it.
+
+        Python ignores exceptions in a weak reference's callback, for example.
+        """
         if isinstance(unraisable.exc_value, KeyboardInterrupt):
             threading.Timer(0.01, _thread.interrupt_main).start()
         else:
@@ -206,15 +227,13 @@ def _signals_as_interrupts() -> Iterator[None]:
 
 
 class PlainStream:
-    """A text stream that writes control characters as their escapes, and goes on where nobody reads
-    it any more.
+    """A text stream that escapes control characters, and accepts text after a failed write.
 
     Attributes
     ----------
-    unfiltered : the stream itself.
-    failure : the first error in writing, such as BrokenPipeError; what follows is dropped, so that
-        a command does all
-        its work, and ends with this error.
+    unfiltered : the stream that is written to.
+    failure : the first error in writing, such as BrokenPipeError. Later text is dropped, so that a
+        command completes its work and ends with this error.
     """
 
     def __init__(self, stream: TextIO) -> None:
@@ -222,14 +241,17 @@ class PlainStream:
         self.failure: OSError | None = None
 
     def write(self, text: str) -> int:
+        """Write a text with its control characters escaped."""
         self.write_unfiltered(printable(text))
         return len(text)
 
     def write_unfiltered(self, text: str) -> None:
+        """Write a text as it is."""
         with self._kept_failure():
             self.unfiltered.write(text)
 
     def flush(self) -> None:
+        """Flush the stream."""
         with self._kept_failure():
             self.unfiltered.flush()
 
@@ -247,10 +269,10 @@ class PlainStream:
 
 @contextmanager
 def plain_streams() -> Iterator[None]:
-    """Make standard output and standard error plain in the block; in place of a closed one stands
-    the null device.
+    """Replace standard output and standard error in the block by plain streams.
 
-    What their encoding cannot express, such as ° in ASCII, is written as its escape.
+    A closed stream is replaced by the null device. What the encoding cannot express, such as ° in
+    ASCII, is written as its escape.
     """
     with open(os.devnull, "w") as null, ExitStack() as stack:  # noqa: PTH123  (a device)
         for redirect, stream in ((redirect_stdout, sys.stdout), (redirect_stderr, sys.stderr)):
@@ -262,14 +284,15 @@ def plain_streams() -> Iterator[None]:
 
 
 def print_line(text: str, stream: TextIO) -> None:
-    """Print a line that may be lost: where nobody reads it any more, or the disk is full, it is
-    dropped."""
+    """Print a line, and ignore a failure: a closed stream, or a full disk."""
     with suppress(OSError, ValueError):
         print(text, file=stream, flush=True)
 
 
 def discard_output(stream: TextIO) -> None:
-    """Drop what is in a stream's buffer after a failed write: it must not fail again when the
-    interpreter ends."""
+    """Redirect a stream to the null device after a failed write.
+
+    What is still in its buffer would fail again when the interpreter ends.
+    """
     with suppress(OSError, ValueError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())

@@ -1,4 +1,4 @@
-"""The commands with their arguments, and how the text of each value is read or refused.
+"""Define the commands with their arguments, and read or refuse the text of each value.
 
 A command's code is imported when the command is called.
 """
@@ -25,15 +25,19 @@ _MAX_NUMBER = 1e9  # of a count; of seconds: thirty years
 
 
 def default_results() -> Path:
-    """Return the results file that is read where none is named: `run`'s in this folder, else
-    `reproduce`'s."""
+    """Return the results file that is read if none is named.
+
+    It is that of `run` in this folder if there is one, otherwise that of `reproduce`.
+    """
     results = Path("results.h5")
     return results if results.exists() else REPRODUCED / results
 
 
 def pages_beside(results: Path) -> Path:
-    """Return the folder for the pages of a file where none is named: `report` beside results.h5,
-    x-report beside x.h5."""
+    """Return the default folder for the pages of a file.
+
+    It is `report` beside results.h5, x-report beside x.h5.
+    """
     return results.parent / ("report" if results.name == "results.h5" else f"{results.stem}-report")
 
 
@@ -42,7 +46,7 @@ def _not_allowed(text: str, allowed: str) -> argparse.ArgumentTypeError:
 
 
 def path(text: str) -> Path:
-    """Return the path of a file or folder, there or not."""
+    """Return the path of a file or folder, whether it exists or not."""
     try:
         return file_path(text)
     except InputError as error:
@@ -50,7 +54,7 @@ def path(text: str) -> Path:
 
 
 def file(text: str) -> Path:
-    """Return the path of an output file: neither an empty name nor an existing folder."""
+    """Return the path of an output file; refuse an empty name and an existing folder."""
     output = path(text)
     if not output.name or output.name == ".." or output.is_dir():
         raise _not_allowed(text, "a file's name, not a folder")
@@ -58,7 +62,7 @@ def file(text: str) -> Path:
 
 
 def folder(text: str) -> Path:
-    """Return the path of an output folder: one that exists, or that can be made."""
+    """Return the path of an output folder that exists or can be created."""
     output = path(text)
     existing = next((place for place in (output, *output.parents) if place.exists()), output)
     if not (existing.is_dir() and os.access(existing, os.W_OK)):
@@ -67,7 +71,17 @@ def folder(text: str) -> Path:
 
 
 def span(text: str) -> tuple[float, ...]:
-    """Return COUNT numbers from FROM to TO, both included, of "FROM:TO:COUNT"."""
+    """Return COUNT equally spaced speeds from FROM to TO, both included.
+
+    Parameters
+    ----------
+    text : "FROM:TO:COUNT", in rad/s.
+
+    Raises
+    ------
+    argparse.ArgumentTypeError
+        If the text has another form, or a speed is out of range.
+    """
     try:
         start, end, number = text.split(":")
         first, last, count = float(start), float(end), int(number)
@@ -86,7 +100,7 @@ def span(text: str) -> tuple[float, ...]:
 
 
 def part(text: str) -> tuple[int, int]:
-    """Return (K, N) of "K/N"."""
+    """Return (K, N) from "K/N"."""
     number, _, parts = text.partition("/")
     try:
         are_whole = number.isdecimal() and parts.isdecimal()
@@ -98,7 +112,7 @@ def part(text: str) -> tuple[int, int]:
 
 
 def setting(text: str) -> tuple[str, object]:
-    """Return (name, value) of "name=value": a number where it is one."""
+    """Return (name, value) from "name=value"; the value is a number if it can be read as one."""
     name, equals, value = (piece.strip() for piece in text.partition("="))
     if not (name and equals and value):
         raise _not_allowed(text, "NAME=VALUE")
@@ -132,7 +146,7 @@ POSITIVE = _positive(float, "a number more than 0, at most 1e9")
 
 
 class _Parser(argparse.ArgumentParser):
-    """Bad usage is one line, as all bad input is, without the usage above it."""
+    """An argument parser that reports bad usage in one line, without the usage before it."""
 
     def error(self, message: str) -> NoReturn:
         self.exit(2, f"{self.prog}: {message}; see {self.prog} --help\n")
@@ -197,8 +211,17 @@ class _Names(argparse.Action):
 
 
 def parse(argv: Sequence[str]) -> argparse.Namespace:
-    """Return the arguments; `command` is the place of the function to call, "module:function". Ends
-    with status 2 on bad usage."""
+    """Return the parsed arguments of a command; end with status 2 on bad usage.
+
+    Parameters
+    ----------
+    argv : the command and its arguments; without any, the help is printed.
+
+    Returns
+    -------
+    argparse.Namespace
+        Its `command` names the function to call, "module:function".
+    """
     parser, commands = _parser()
     if argv and not argv[0].startswith("-") and argv[0] not in commands:
         hint = nearest(argv[0], commands)
@@ -212,8 +235,10 @@ def parse(argv: Sequence[str]) -> argparse.Namespace:
 
 
 def load_methods(arguments: argparse.Namespace) -> None:
-    """Replace Python files in the arguments by the names of their methods. Raises InputError for
-    methods that are unknown."""
+    """Replace Python files in the arguments by the names of their methods.
+
+    Raises InputError for methods that are unknown.
+    """
     given = [name for name in ("method", "methods") if name in arguments]
     if given:
         # late: other commands need not wait for it
@@ -243,7 +268,14 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
 
     def command(name: str, text: str, function: str, *examples: str) -> _Parser:
-        """function: "module:function" in `rotor_mbs.cli`; examples: what may follow the name."""
+        """Add a command.
+
+        Parameters
+        ----------
+        name, text : of the command, and its description.
+        function : "module:function" in `rotor_mbs.cli`.
+        *examples : arguments that may follow the name.
+        """
         lines = ["example:", *(f"  rotor-mbs {name} {example}".rstrip() for example in examples)]
         own = commands.add_parser(
             name, help=text, description=text, epilog="\n".join(lines), formatter_class=formatter

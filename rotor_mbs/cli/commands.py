@@ -1,8 +1,7 @@
-"""The commands but for `run`, `reproduce`, `reference`, `check` and `test-method`: what is
-available, studies, pages.
+"""Define the commands that list and show what is available, run studies and write pages.
 
-Each loads what it needs, and not what the others need: `list` reads no scene, and pages load no
-model.
+`run`, `reproduce` and `reference` are in `cli.runs`, `check` and `test-method` in `cli.verdicts`.
+Each command imports only what it needs: `list` reads no scene, and pages load no model.
 """
 
 from __future__ import annotations
@@ -47,7 +46,12 @@ from rotor_mbs.solution.status import REFUSED
 
 
 def list_all(arguments: argparse.Namespace) -> int:
-    """Print name and title of every shipped scene and sweep, name and label of every method."""
+    """Print the name and title of every shipped scene and sweep, name and label of every method.
+
+    Parameters
+    ----------
+    arguments : `json`, whether they are printed as JSON.
+    """
     scenes, sweeps = list_scenes(), list_sweeps()
     labels = [(method.name, method.label) for method in methods()]
     if arguments.json:
@@ -74,8 +78,19 @@ def list_all(arguments: argparse.Namespace) -> int:
 
 
 def new(arguments: argparse.Namespace) -> int:
-    """Write a commented scene file, with a mapping for the results of an OpenFAST model; never over
-    other files."""
+    """Write a commented scene file that does not exist yet.
+
+    For an OpenFAST model, a mapping file for its results is written beside it.
+
+    Parameters
+    ----------
+    arguments : `file`, the scene file; `source`, a scene, a TOML file or a .fst file, or None.
+
+    Raises
+    ------
+    InputError
+        If a name is not allowed, a file exists or cannot be created, or the source cannot be read.
+    """
     from rotor_mbs.scenario.scene import new_scene_text
 
     path = arguments.file
@@ -113,13 +128,17 @@ def new(arguments: argparse.Namespace) -> int:
 
 
 def _files_of_model(path: Path, model: Path) -> tuple[dict[Path, str], list[str]]:
-    """Return the texts of the scene and the mapping of an OpenFAST model by path, and lines that
-    tell of them.
+    """Return the scene and the mapping of an OpenFAST model, and lines that describe them.
 
     Parameters
     ----------
-    path : of the scene file.
+    path : of the scene file; the mapping is beside it.
     model : the model's .fst file.
+
+    Returns
+    -------
+    dict of str by Path, list of str
+        The text of each file, and the lines to print.
     """
     from rotor_mbs.scenario.openfast import read_rotor
     from rotor_mbs.scenario.openfast_scene import mapping_text, scene_of_rotor
@@ -148,8 +167,13 @@ def _files_of_model(path: Path, model: Path) -> tuple[dict[Path, str], list[str]
 
 
 def show(arguments: argparse.Namespace) -> int:
-    """Show a scene's data and methods, with --build its items; the settings of a method; or what is
-    in a file."""
+    """Show a scene with its methods, the settings of a method, or what is in a file.
+
+    Parameters
+    ----------
+    arguments : `scene`, the name or path; `build`, whether the items that each model builds are
+        listed; `json`, whether JSON is printed.
+    """
     if arguments.scene.endswith(ENDING):
         for name in check_names(arguments.scene):
             _show_method(find_method(name), as_json=arguments.json)
@@ -171,7 +195,13 @@ def show(arguments: argparse.Namespace) -> int:
 
 
 def _show_method(method: Method, *, as_json: bool) -> None:
-    """Print the settings of a method."""
+    """Print the settings of a method: defaults, allowed values and meanings.
+
+    Parameters
+    ----------
+    method : the method.
+    as_json : whether JSON is printed.
+    """
     declared, defaults = method.settings.declared(), method.defaults
     if as_json:
         rules = {}
@@ -192,8 +222,13 @@ def _show_method(method: Method, *, as_json: bool) -> None:
 
 
 def _show_scene(arguments: argparse.Namespace) -> None:
-    """Print a scene's data, the methods that can run it, and with --build what each model
-    builds."""
+    """Print a scene's data and the methods that can run it.
+
+    Parameters
+    ----------
+    arguments : `scene`, its name or path; `build`, whether the items that each model builds are
+        printed; `json`, whether JSON is printed.
+    """
     from rotor_mbs.scenario.scene import scene_keys, scene_tables, unit_of, without_times
 
     scene = only_scene(arguments.scene)
@@ -241,8 +276,20 @@ _DISK_IS_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 def bench(arguments: argparse.Namespace) -> int:
-    """Measure errors and run times, and write their pages; 0 also where points failed, which is
-    what is measured."""
+    """Measure errors and run times, and write their pages.
+
+    The exit status is 0 also if some points failed, as that is a result of the measurement.
+
+    Parameters
+    ----------
+    arguments : `scenes`, `method`, `output`, and `repeats` (runs per point) and `budget` (s per
+        scene).
+
+    Returns
+    -------
+    int
+        1 if a curve was not computed, otherwise 0.
+    """
     from rotor_mbs.analysis.text_tables import bench_table
     from rotor_mbs.runs.read import read_records
     from rotor_mbs.studies.bench import run_bench
@@ -274,8 +321,20 @@ def bench(arguments: argparse.Namespace) -> int:
 
 
 def stability(arguments: argparse.Namespace) -> int:
-    """Run the stiff and extreme suite, print how many runs of each method are ok, write its pages;
-    1 where a run was not computed."""
+    """Run the suite of stiff and extreme scenes, and write its pages.
+
+    The number of runs with status ok is printed for each method.
+
+    Parameters
+    ----------
+    arguments : `scenes` (by default the suite), `method`, `set`, `output`, `jobs`, and `timeout` of
+        a run (s).
+
+    Returns
+    -------
+    int
+        1 if a run was not computed, otherwise 0.
+    """
     from rotor_mbs.studies.stability import SUITE, run_suite, suite_runs, suite_table
 
     start, scenes = time.monotonic(), find_scenes(arguments.scenes or SUITE)
@@ -296,8 +355,19 @@ def stability(arguments: argparse.Namespace) -> int:
 
 
 def modes(arguments: argparse.Namespace) -> int:
-    """Print the modes of every scene; 1 where two models disagree on a frequency or a scene could
-    not be computed."""
+    """Compute and print the modes of scenes, and write their pages.
+
+    Parameters
+    ----------
+    arguments : `scenes`, `speeds` (rad/s), `method`, `output`, `jobs`, `timeout` of a scene (s),
+        and `json`, which prints JSON and writes no pages.
+
+    Returns
+    -------
+    int
+        1 if two models disagree on a frequency, or a scene could not be computed; 2 if the methods
+        refused all scenes; otherwise 0.
+    """
     from rotor_mbs.analysis.modes import mode_rows, mode_summary, read_modes
     from rotor_mbs.studies.modes import modes_of_scenes
 
@@ -333,8 +403,25 @@ def modes(arguments: argparse.Namespace) -> int:
 
 
 def compare(arguments: argparse.Namespace) -> int:
-    """Compare data of another program with a scene's reference: print a table, write its page and
-    the numbers as a results file."""
+    """Compare data of another program with a scene's reference.
+
+    A table is printed; a page and a results file with the numbers are written.
+
+    Parameters
+    ----------
+    arguments : `data`, `scene`, `columns` (mapping file), `tolerance` (rad), `timeout` (s),
+        `output` (folder), and `json`, which prints the verdict as JSON.
+
+    Returns
+    -------
+    int
+        0 if they agree, otherwise 1.
+
+    Raises
+    ------
+    InputError, StoreError
+        If the data cannot be compared, or the results file is not one of comparisons.
+    """
     from rotor_mbs.api.comparisons import compare as compare_data
     from rotor_mbs.comparison.verdict import as_dictionary
     from rotor_mbs.runs.trailer import COMPARISON, may_extend
@@ -358,7 +445,7 @@ def compare(arguments: argparse.Namespace) -> int:
 
 
 def export(arguments: argparse.Namespace) -> int:
-    """Write a scene for another program, and print the paths that were written, a line each."""
+    """Write a scene for another program, and print the path of each file that was written."""
     from rotor_mbs.studies.export import FORMATS
     from rotor_mbs.studies.export import export as export_scene
 
@@ -369,7 +456,7 @@ def export(arguments: argparse.Namespace) -> int:
 
 
 def report(arguments: argparse.Namespace) -> int:
-    """Write pages of `arguments.file` into `arguments.output`, or beside the file."""
+    """Write the pages of `arguments.file` into the folder `arguments.output`, or beside it."""
     from rotor_mbs.report.build import write_report
 
     output = arguments.output or pages_beside(arguments.file)
@@ -383,7 +470,7 @@ def report(arguments: argparse.Namespace) -> int:
 
 
 def figures(arguments: argparse.Namespace) -> int:
-    """Write the paper's figures as files for a manuscript into `arguments.output`."""
+    """Write the paper's figures as files for a manuscript into the folder `arguments.output`."""
     from rotor_mbs.report.figures import write_figures
 
     print(
@@ -394,7 +481,7 @@ def figures(arguments: argparse.Namespace) -> int:
 
 
 def animate(arguments: argparse.Namespace) -> int:
-    """Draw the motion of `arguments.scene` of `arguments.file` into `arguments.output`."""
+    """Draw the motion of `arguments.scene` in `arguments.file` as an animated image."""
     from rotor_mbs.report.animation import write_animation
 
     output = arguments.output or file_path(arguments.scene.rpartition("/")[2] + ".webp")
@@ -403,8 +490,25 @@ def animate(arguments: argparse.Namespace) -> int:
 
 
 def sweep(arguments: argparse.Namespace) -> int:
-    """Run a parameter study into one dataset; 1 where a run did not succeed, or the disk is
-    full."""
+    """Run a parameter study, and store its runs in one dataset.
+
+    Parameters
+    ----------
+    arguments : `file`, the sweep; `method`, `engine`, `jobs`, `part` (K, N), `timeout` of a run
+        (s), `output`; `fresh`, whether stored runs are recomputed; `dry_run`, whether only numbers are
+        printed; `metadata` and `datasets`, what else is written; `json`.
+
+    Returns
+    -------
+    int
+        1 if a run did not succeed or the disk is full; 2 if the methods refused all runs, or the
+        file cannot be used; otherwise 0.
+
+    Raises
+    ------
+    InputError
+        If the sweep or the engine is wrong.
+    """
     from rotor_mbs.runs.engines import open_task_pool
 
     # its workers load their code meanwhile

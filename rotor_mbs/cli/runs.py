@@ -1,4 +1,4 @@
-"""`run`, `reproduce` and `reference`."""
+"""Define the commands `run`, `reproduce` and `reference`."""
 
 from __future__ import annotations
 
@@ -24,8 +24,25 @@ from rotor_mbs.studies.run import run_scenes
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Run scenes with the methods named with -m, or by a scene's file; without, a rule selects
-    them."""
+    """Run scenes with methods, and print a table of the runs and a summary.
+
+    The methods are those named with -m, else those in a scene's file, else they are selected by a
+    rule.
+
+    Parameters
+    ----------
+    arguments : `scenes`, `method`, `set` (settings), `output`, `jobs`, and `timeout` of a run (s).
+
+    Returns
+    -------
+    int
+        The exit status of `print_summary`.
+
+    Raises
+    ------
+    InputError
+        If no scene has a method that can run it.
+    """
     scenes, settings = find_scenes(arguments.scenes, problems_of_scene), dict(arguments.set or ())
     methods, reasons, refused = selected_methods(scenes, arguments.method, settings)
     for reason in reasons:
@@ -47,11 +64,19 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def reproduce(arguments: argparse.Namespace) -> int:
-    """Compute every scene of the paper, and the report; nothing where the last call ended well with
-    all that decides it equal.
+    """Compute every scene of the paper, and write the report.
 
-    That is every bit of the results file, too: a changed one is found as by the checksums inside
-    the file.
+    Nothing is done if the last call succeeded, and neither its inputs nor the results file have
+    changed since, by a digest over all of them (`studies.reproduce.made_from`).
+
+    Parameters
+    ----------
+    arguments : `output` (folder), `jobs`, and `timeout` of a run (s).
+
+    Returns
+    -------
+    int
+        The exit status of `print_summary`, or 0 if nothing had to be done.
     """
     start, status = time.monotonic(), 0
     results, pages = arguments.output / "results.h5", arguments.output / "report"
@@ -76,7 +101,7 @@ def reproduce(arguments: argparse.Namespace) -> int:
 
 
 def _reproduce(arguments: argparse.Namespace, results: Path, pages: Path) -> tuple[int, str]:
-    """Return the exit status and the summary; one pool of processes does all."""
+    """Compute the runs, write the pages with the same processes, and return status and summary."""
     load_runs = partial(import_module, "rotor_mbs.studies.reproduce")
     with local_pool(arguments.jobs, load_runs) as pool, ProgressLine() as progress:
         report, refused = reproduce_paper(
@@ -89,7 +114,7 @@ def _reproduce(arguments: argparse.Namespace, results: Path, pages: Path) -> tup
 
 
 def reference(arguments: argparse.Namespace) -> int:
-    """Compute references, also those that are shipped."""
+    """Compute the references of scenes, including those that are shipped."""
     scenes = find_scenes(arguments.scenes)
     with ProgressLine() as progress:
         report = run_scenes(

@@ -1,4 +1,4 @@
-"""What the commands print alike: tables, JSON, the summary of runs."""
+"""Print what several commands have in common: tables, JSON, the summary of runs."""
 
 from __future__ import annotations
 
@@ -23,8 +23,10 @@ if TYPE_CHECKING:  # a sweep's workers load their code meanwhile
 
 
 def print_table(table: TextTable | str) -> None:
-    """Print a table on standard output, after an empty line, with its statuses coloured on a
-    terminal; nothing without rows."""
+    """Print a table on standard output after an empty line, unless it has no rows.
+
+    On a terminal its statuses are coloured.
+    """
     if isinstance(table, str) or table.rows:
         # Colours are control characters, which the stream would escape.
         write = getattr(sys.stdout, "write_unfiltered", sys.stdout.write)
@@ -32,15 +34,17 @@ def print_table(table: TextTable | str) -> None:
 
 
 def print_json(data: object, *, indent: int | None = None) -> None:
-    """Print data as JSON on standard output, in ASCII where the stream's encoding may lack a
-    character."""
+    """Print data as JSON on standard output.
+
+    Characters outside ASCII are escaped unless the stream's encoding is a Unicode one.
+    """
     encoding = sys.stdout.encoding or "utf-8"
     is_unicode = encoding.lower().startswith("utf")
     print(json.dumps(data, ensure_ascii=not is_unicode, indent=indent))
 
 
 def print_summary(report: BatchReport, output: Path, refused: Sequence[Refusal] = ()) -> int:
-    """Print the runs of a call in a few lines.
+    """Print a summary of the runs of a call, and return the exit status.
 
     Parameters
     ----------
@@ -78,8 +82,7 @@ def print_not_computed(made: Sequence[RunOutcome], refused: Sequence[Refusal] = 
     Parameters
     ----------
     made : what a call computed or tried to. Not computed are runs that their method refused when it
-        was built, and
-        runs whose process died or could not start.
+        was built, and runs whose process died or could not start.
     refused : runs that were left out before.
 
     Returns

@@ -1,4 +1,7 @@
-"""`check` and `test-method`: checks as lines of text, JSON, JUnit XML and annotations of GitHub."""
+"""Define the commands `check` and `test-method`, and the formats of their results.
+
+Checks are written as lines of text, JSON, JUnit XML and annotations of GitHub.
+"""
 
 from __future__ import annotations
 
@@ -31,8 +34,25 @@ JSON = rb'\A\[\]\Z|\A\[\n \{\n  "check": "'
 
 
 def check(arguments: argparse.Namespace) -> int:
-    """Print every verdict that fails (with --verbose all), then a count; return 1 where one
-    fails."""
+    """Check the accuracy of stored runs, or of a default set, and print the failures and a count.
+
+    Parameters
+    ----------
+    arguments : `file`, or None for the default set with `method` and `jobs`; `bounds`, a TOML file;
+        `require`, methods that every scene must have; `against`, an earlier file, and
+        `allow_changed`; `junit` and `json`, the files to write; `github`; `verbose`, whether passed
+        checks are printed too.
+
+    Returns
+    -------
+    int
+        1 if a check fails, otherwise 0.
+
+    Raises
+    ------
+    InputError
+        For options that do not go together, or files of different kinds.
+    """
     _refuse_foreign(arguments)
     if arguments.allow_changed and arguments.against is None:
         raise InputError("--allow-changed: allowed: with --against OLD")
@@ -119,8 +139,23 @@ def worst_first(failures: Sequence[Check]) -> list[Check]:
 
 
 def test_method(arguments: argparse.Namespace) -> int:
-    """Examine methods, and print what holds of each and the most likely reason where something does
-    not; return 1 there."""
+    """Test methods, and print each check with the most likely reason of a failure.
+
+    Parameters
+    ----------
+    arguments : `methods`, their names; `timeout` of a run (s); `junit` and `json`, the files to
+        write.
+
+    Returns
+    -------
+    int
+        1 if a check fails, otherwise 0.
+
+    Raises
+    ------
+    InputError
+        If `junit` or `json` is a file of another kind, or both are the same file.
+    """
     from rotor_mbs.studies.method_test import examine  # late: `check` needs no models
 
     _refuse_foreign(arguments)
@@ -154,8 +189,10 @@ def test_method(arguments: argparse.Namespace) -> int:
 
 
 def _refuse_foreign(arguments: argparse.Namespace) -> None:
-    """Refuse files of --junit and --json that hold something else, or are the same, before anything
-    is computed."""
+    """Raise InputError if --junit or --json is a file of another kind, or both are the same.
+
+    This is checked before anything is computed.
+    """
     if (
         arguments.junit is not None
         and arguments.json is not None
@@ -178,8 +215,11 @@ def _write_verdicts(arguments: argparse.Namespace, verdicts: Sequence[Check]) ->
 
 
 def line(check: Check) -> str:
-    """Return the line of a check: outcome, what was checked where, the value, the bound, the
-    margin; of a failure what to look at."""
+    """Return a check as one line of text.
+
+    It has the outcome, what was checked in which run, the value, the bound, the margin, and for a
+    failure its probable reason.
+    """
     outcome = "pass" if check.passed else "FAIL"
     margin = "inf" if math.isinf(check.margin) else f"{check.margin:.3g}"
     unit = f" {check.unit}" if check.unit else ""
@@ -202,8 +242,14 @@ def github(check: Check) -> str:
 
 
 def as_json(checks: Sequence[Check]) -> str:
-    """Return checks as a JSON list of objects; numbers that JSON cannot hold (NaN, infinity) become
-    null."""
+    """Return checks as a JSON list of objects.
+
+    Numbers that JSON cannot hold (NaN, infinity) become null.
+
+    Parameters
+    ----------
+    checks : in the order of the list.
+    """
     rows = []
     for check in checks:
         numbers = {"value": check.value, "bound": check.bound, "margin": check.margin}
@@ -223,8 +269,17 @@ def as_json(checks: Sequence[Check]) -> str:
 
 
 def junit(checks: Sequence[Check]) -> bytes:
-    """Return checks as JUnit XML, as GitHub's and GitLab's viewers read it: a suite per scene, a
-    case per check."""
+    """Return checks as JUnit XML, as the viewers of GitHub and GitLab read it.
+
+    Parameters
+    ----------
+    checks : each becomes a case, in a suite of its scene.
+
+    Returns
+    -------
+    bytes
+        The document in UTF-8.
+    """
     root = ElementTree.Element("testsuites", {"name": "rotor-mbs check", **_counts(checks)})
     for scene in dict.fromkeys(check.where.scene for check in checks):
         of_scene = [check for check in checks if check.where.scene == scene]
@@ -257,6 +312,8 @@ def _counts(checks: Sequence[Check]) -> dict[str, str]:
 
 
 def escaped(text: str) -> str:
-    """Return `text` with escapes for what controls a terminal or is not allowed in XML: control
-    characters, surrogates."""
+    """Return `text` with escapes for control characters and surrogates.
+
+    These would control a terminal, or are not allowed in XML.
+    """
     return "".join(char if char.isprintable() else ascii(char)[1:-1] for char in text)
