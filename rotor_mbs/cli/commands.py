@@ -495,8 +495,8 @@ def sweep(arguments: argparse.Namespace) -> int:
     Parameters
     ----------
     arguments : `file`, the sweep; `method`, `engine`, `jobs`, `part` (K, N), `timeout` of a run
-        (s), `output`; `fresh`, whether stored runs are recomputed; `dry_run`, whether only numbers are
-        printed; `metadata` and `datasets`, what else is written; `json`.
+        (s), `output`; `fresh`, whether stored runs are recomputed; `dry_run`, whether only numbers
+        are printed; `metadata` and `datasets`, what else is written; `json`.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Arrays in any HDF5 file, of this program or of another."""
+"""Read arrays from any HDF5 file, of this program or of another."""
 
 from __future__ import annotations
 
@@ -38,8 +38,8 @@ class StoredArrays(NamedTuple):
     Attributes
     ----------
     arrays : by name, of up to three dimensions, as they are stored.
-    attributes : by name of the array those of `ARRAY_ATTRIBUTES` that it has, numbers and texts.
-    others : by name what else is in the group, and what that is; whether it is a column of
+    attributes : for each array those of `ARRAY_ATTRIBUTES` that it has, numbers and texts.
+    others : for each other member of the group, by name: what it is, and whether it is a column of
         something else than numbers.
     """
 
@@ -51,22 +51,23 @@ class StoredArrays(NamedTuple):
 def read_arrays(
     path: Path, group: str = "", scene: str = "", max_bytes: float = math.inf
 ) -> StoredArrays:
-    """Read arrays of numbers of up to three dimensions and their attributes from one group of any
-    HDF5 file.
+    """Read the arrays of numbers of one group of any HDF5 file, with their attributes.
+
+    Arrays have up to three dimensions.
 
     Parameters
     ----------
     path : the file; of another program, or of this one.
-    group : path of the group, or the end of it, "/" for the root; may be left out where one group
-        alone has arrays, or
-        one alone but the reference below `scene`.
+    group : path of the group, or the end of it, "/" for the root. It may be left out if only one
+        group has arrays, or only one below `scene` except the reference.
     scene : name of a scene, whose groups are preferred.
-    max_bytes : of all arrays as float64, by what the file claims of them, before any is read.
+    max_bytes : largest size of all arrays as float64, by what the file claims, before any is read.
 
     Raises
     ------
     StoreError
-        If the file cannot be read or claims more, or with the groups that there are.
+        If the file cannot be read or claims more, or `group` is not found or ambiguous; the message
+        then has the groups that there are.
     """
     try:
         with h5py.File(path, "r") as file:
@@ -90,8 +91,18 @@ def read_arrays(
 
 
 def refuse_claims(path: Path, max_bytes: float) -> None:
-    """Raise StoreError if an HDF5 file claims more than `max_bytes`, or has arrays that other files
-    store."""
+    """Raise StoreError if an HDF5 file is too large, or has arrays stored in other files.
+
+    Parameters
+    ----------
+    path : the file.
+    max_bytes : largest size of all arrays as float64, by what the file claims.
+
+    Raises
+    ------
+    StoreError
+        Also if the file cannot be read.
+    """
     datasets: list[Any] = []
 
     def note(_: str, item: Any) -> None:
@@ -107,7 +118,14 @@ def refuse_claims(path: Path, max_bytes: float) -> None:
 
 
 def _refuse_claims(path: Path, datasets: Iterable[Any], max_bytes: float) -> None:
-    """Raise StoreError if datasets are larger than `max_bytes` in all, or stored in other files."""
+    """Raise StoreError if datasets exceed `max_bytes` in all, or are stored in other files.
+
+    Parameters
+    ----------
+    path : of the file, for the message.
+    datasets : the HDF5 datasets.
+    max_bytes : as float64.
+    """
     size = 0.0
     for dataset in datasets:
         size += 8.0 * dataset.size
@@ -121,8 +139,18 @@ def _refuse_claims(path: Path, datasets: Iterable[Any], max_bytes: float) -> Non
 
 
 def _what_it_is(group: Any, name: str) -> tuple[str, bool]:
-    """Return what a member of a group is that is no array of numbers, and whether it is a column
-    for all that."""
+    """Describe a member of a group that is no array of numbers.
+
+    Parameters
+    ----------
+    group : the HDF5 group.
+    name : of the member.
+
+    Returns
+    -------
+    str, bool
+        What it is, and whether it is a column of something else than numbers.
+    """
     if group.get(name, getlink=True).__class__ is not h5py.HardLink:
         return "a link to another file or place", False
     item = group[name]
@@ -140,7 +168,12 @@ def _what_it_is(group: Any, name: str) -> tuple[str, bool]:
 def _attributes_of_array(dataset: Any) -> dict[str, Any]:
     """Return those of `ARRAY_ATTRIBUTES` that an array has.
 
-    Many texts, which may take long to read, and what is neither a number nor a text are no unit.
+    Left out are lists of texts, which may take long to read, and values that are neither a number
+    nor a text.
+
+    Parameters
+    ----------
+    dataset : the HDF5 dataset.
     """
     found = {}
     for name in ARRAY_ATTRIBUTES:
@@ -158,7 +191,19 @@ def _attributes_of_array(dataset: Any) -> dict[str, Any]:
 
 
 def chosen_group(path: Path, places: Sequence[str], group: str, scene: str) -> str:
-    """Return the one of `places` that is meant, see `read_arrays`. Raises StoreError."""
+    """Return the group that a caller of `read_arrays` means.
+
+    Parameters
+    ----------
+    path : the file, for the message.
+    places : paths of the groups that have arrays.
+    group, scene : see `read_arrays`.
+
+    Raises
+    ------
+    StoreError
+        If no group or several groups fit.
+    """
     inside = [place for place in places if place.startswith(f"{scene}/")] or list(places)
     fitting: list[str]
     is_root, group = group.strip() == "/", group.strip("/")
@@ -179,7 +224,14 @@ def chosen_group(path: Path, places: Sequence[str], group: str, scene: str) -> s
 
 
 def _array_places(file: Any) -> dict[str, list[str]]:
-    """Return the names of the arrays of numbers by their group; groups without any are left out."""
+    """Return the names of the arrays of numbers by the path of their group.
+
+    Groups without any are left out.
+
+    Parameters
+    ----------
+    file : an h5py.File.
+    """
     places: dict[str, list[str]] = {}
 
     def note(path: str, item: Any) -> None:

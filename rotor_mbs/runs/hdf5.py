@@ -1,7 +1,7 @@
-"""Files of this program read by the HDF5 library: attributes, columns and values of groups, not the
-rows.
+"""Read attributes, columns and values of groups with the HDF5 library, but not the rows.
 
-The worker process of `runs.untrusted` loads this module, and nothing else of the package.
+The files are of this program. The worker process of `runs.untrusted` loads this module, and
+nothing else of the package.
 """
 
 from __future__ import annotations
@@ -40,8 +40,15 @@ ATTEMPTS = 3  # to open a file that is being replaced
 
 
 class Column(NamedTuple):
-    """A dataset: its dimensions (names of scales; a scale has its own name), units, what it is, the
-    type of its values in the file, and further attributes."""
+    """Description of a dataset.
+
+    Attributes
+    ----------
+    dimensions : names of scales; a scale has its own name.
+    units, long_name : its unit and its meaning.
+    kind : type of its values in the file.
+    attributes : further ones.
+    """
 
     dimensions: tuple[str, ...]
     units: str
@@ -51,8 +58,14 @@ class Column(NamedTuple):
 
 
 class StoredRows(NamedTuple):
-    """A computed column: shape, offset in the file in bytes, and whether that is what the trailer
-    says."""
+    """Location of a computed column in a file.
+
+    Attributes
+    ----------
+    shape : of the column.
+    offset : in the file, bytes.
+    is_in_place : whether that is what the trailer says.
+    """
 
     shape: tuple[int, ...]
     offset: int
@@ -67,8 +80,8 @@ class StoredGroup(NamedTuple):
     attributes : of the group.
     columns : its datasets by name.
     values : of each dataset whose rows are not in the trailer.
-    rows : the others.
-    characters : of each computed text.
+    rows : location of each dataset whose rows are in the trailer.
+    characters : length of each computed text.
     """
 
     attributes: Mapping[str, Any]
@@ -79,8 +92,15 @@ class StoredGroup(NamedTuple):
 
 
 class Content(NamedTuple):
-    """A file without its rows: attributes, names of its groups, those that were read by name, and
-    its inode."""
+    """A file without its rows.
+
+    Attributes
+    ----------
+    attributes : of the file.
+    names : of all its groups.
+    groups : those that were read, by name.
+    inode : of the file.
+    """
 
     attributes: dict[str, Any]
     names: list[str]
@@ -132,8 +152,22 @@ def _read_group(group: Any, regions: Mapping[str, tuple[int, int]]) -> StoredGro
 
 @contextmanager
 def open_file(path: Path) -> Iterator[tuple[Any, Trailer]]:
-    """Open a file of this program for reading, after its trailer was checked. Raises StoreError
-    where it is missing, damaged or another program's."""
+    """Open a file of this program for reading, after its trailer was checked.
+
+    Parameters
+    ----------
+    path : the file.
+
+    Yields
+    ------
+    h5py.File, Trailer
+        The file, and its trailer.
+
+    Raises
+    ------
+    StoreError
+        If the file is missing, damaged, of another program, or is being replaced.
+    """
     for _ in range(ATTEMPTS):
         trailer = read_trailer(path)
         try:
@@ -160,9 +194,15 @@ def open_file(path: Path) -> Iterator[tuple[Any, Trailer]]:
 
 @contextmanager
 def reading(path: Path | str, what: str = "") -> Iterator[None]:
-    """Raise whatever goes wrong in the block with what a file holds as a StoreError that names the
-    place. HDF5 raises errors of many kinds on damaged files, and so does code with what a forged
-    one says, although its digest is right."""
+    """Raise an error of the block that the content of a file causes as a StoreError.
+
+    HDF5 raises errors of many types on damaged files, and so does code that uses the content of a
+    forged file with a right digest.
+
+    Parameters
+    ----------
+    path, what : the file, and the part of it, for the message.
+    """
     try:
         yield
     except (RotorError, ImportError, MemoryError, BrokenPipeError):
@@ -173,14 +213,14 @@ def reading(path: Path | str, what: str = "") -> Iterator[None]:
 
 
 def group_at(file: Any, path: str) -> Any:
-    """Return a group by its path. Raises StoreError where there is none, or a link."""
+    """Return a group by its path. Raises StoreError if it is missing or a link."""
     for name in path.split("/") if path else ():
         file = member(file, name)
     return file
 
 
 def member(group: Any, name: str) -> Any:
-    """Return a member of a group. Raises StoreError where there is none, or a link."""
+    """Return a member of a group. Raises StoreError if it is missing or a link."""
     link = group.get(name, getlink=True)
     if not isinstance(link, h5py.HardLink):
         found = "is missing" if link is None else "is a link"
@@ -192,8 +232,22 @@ def member(group: Any, name: str) -> Any:
 
 
 def values_of(dataset: Any) -> NDArray[Any]:
-    """Read an array of numbers, or of texts, whole. Raises StoreError where it is not in the file,
-    or claims far more than the file holds."""
+    """Read an array of numbers or of texts.
+
+    Parameters
+    ----------
+    dataset : an h5py.Dataset.
+
+    Returns
+    -------
+    ndarray
+        Texts have the type object.
+
+    Raises
+    ------
+    StoreError
+        If it is no array, not contiguous in this file, or claims far more than the file holds.
+    """
     place = f"{dataset.file.filename}: {dataset.name}"
     if not isinstance(dataset, h5py.Dataset) or dataset.shape is None:
         raise StoreError(f"{place} is no array")
@@ -231,16 +285,29 @@ def plain(value: Any) -> Any:
 
 
 def attributes_of(target: Any) -> dict[str, Any]:
-    """Return the attributes of a group or dataset as plain Python values, without those that the
-    library writes by itself."""
+    """Return the attributes of a group or dataset as plain Python values.
+
+    Those that the HDF5 library writes itself are left out.
+    """
     return {name: attribute(target, name) for name in target.attrs if name not in _NOT_ATTRIBUTES}
 
 
 def attribute(target: Any, name: str, default: Any = None) -> Any:
-    """Return an attribute as a plain Python value, or the default where there is none. Raises
-    ValueError for a type that no attribute has.
+    """Return an attribute as a plain Python value.
 
-    In a damaged file a text may have become a list of any type: reading it ends the process.
+    In a damaged file a text may have become a list of any type, which would end the process if it
+    were read.
+
+    Parameters
+    ----------
+    target : a file, group or dataset.
+    name : of the attribute.
+    default : returned if there is none.
+
+    Raises
+    ------
+    ValueError
+        If its type is one that no attribute has.
     """
     if not h5py.h5a.exists(target.id, name.encode()):
         return default
@@ -267,13 +334,14 @@ def datasets_of(group: Any) -> dict[str, Any]:
 
 
 def _dimension(dataset: Any, axis: int, name: str, scale_names: dict[int, str]) -> str:
-    """Return the name of the scale of an axis; a dataset without one is a scale, and its own
-    dimension.
+    """Return the name of the scale of an axis of a dataset.
+
+    A dataset without one is a scale, and its own dimension.
 
     Parameters
     ----------
     dataset, axis, name : the array, the number of its axis, and its name.
-    scale_names : by the address of a scale in the file, of those that were met; the scale is added.
+    scale_names : by address of a scale in the file, names that are known; the scale is added.
     """
     scales: list[Any] = []
     if h5py.h5ds.get_num_scales(dataset.id, axis):
@@ -309,12 +377,15 @@ def columns_of(datasets: Mapping[str, Any]) -> dict[str, Column]:
 
 
 def is_group(item: Any) -> bool:
+    """Return whether an item of a file is a group."""
     return isinstance(item, h5py.Group)
 
 
 def reason_of(error: Exception) -> str:
-    """Return what HDF5 says in brackets, "file signature not found", without the name of its
-    function."""
+    """Return the text in brackets of an HDF5 error, such as "file signature not found".
+
+    The name of HDF5's function is left out.
+    """
     text = str(error).splitlines()[0]
     return text.partition("(")[2].rpartition(")")[0] or text
 

@@ -1,4 +1,4 @@
-"""New HDF5 files: with room for all rows of their tables, or with groups of arrays."""
+"""Lay out new HDF5 files: with room for all rows of their tables, or with groups of arrays."""
 
 from __future__ import annotations
 
@@ -52,17 +52,26 @@ _HEAD_BYTES = 1 << 17  # of a file beside its rows, at most: descriptions and te
 def create_file(
     path: Path, tables: Sequence[TableSpec], attributes: Mapping[str, object]
 ) -> Iterator[TableFile]:
-    """Yield a new file with room for all rows, under a temporary name; after the block it is
-    complete under its name, or not there.
+    """Yield a new file with room for all rows of tables, under a temporary name.
 
-    Its space is reserved twice: HDF5 does not survive a disk that fills up under it, and truncates
-    the file it begins. Raises StoreError.
+    After the block it is complete under its name, or it does not exist. Its space is reserved twice:
+    HDF5 fails without an error if the disk fills up, and truncates the file when it begins.
 
     Parameters
     ----------
     path : of the file.
     tables : as they are to be laid out.
     attributes : of the file.
+
+    Yields
+    ------
+    TableFile
+        The file under its temporary name.
+
+    Raises
+    ------
+    StoreError
+        If it cannot be written, or the disk has no room for it.
     """
     with replacing(path) as temporary:
         rows = sum(
@@ -106,9 +115,11 @@ def create_file(
 
 
 def _reserve(path: Path, size: int) -> None:
-    """Takes the space on the disk, where the system and the file system can: not on macOS and
-    Windows, where a disk that fills up is reported by the row that finds it full. Raises
-    OSError."""
+    """Reserve space on the disk for a file of `size` bytes. Raises OSError.
+
+    The system and the file system must support it. macOS and Windows do not: there a full disk is
+    reported by the row that cannot be written.
+    """
     with path.open("ab") as file:
         try:
             if hasattr(os, "posix_fallocate"):
@@ -120,7 +131,18 @@ def _reserve(path: Path, size: int) -> None:
 
 
 def _put_table(file: Any, table: TableSpec) -> dict[str, tuple[int, int]]:
-    """Offset and length in bytes of its computed columns."""
+    """Write the layout of a table, and return where its computed columns are.
+
+    Parameters
+    ----------
+    file : an HDF5 file that is open for writing.
+    table : the table; its computed columns are empty, the others are written.
+
+    Returns
+    -------
+    dict of (int, int)
+        Offset and length in bytes by name of the column.
+    """
     group = new_group(file, table.group) if table.group else file
     put_attributes(group, table.attributes)
     put(group, "run", table.runs, Column(("run",), "1", "name or number of the run"))
@@ -137,8 +159,10 @@ def _put_table(file: Any, table: TableSpec) -> dict[str, tuple[int, int]]:
 
 
 def begin_file(place: Path | str, **driver: object) -> Any:
-    """A new HDF5 file with the attributes of the format; on the disk, where it must not fill up,
-    without a `driver`."""
+    """Create an HDF5 file with the attributes of the format.
+
+    Without a `driver` it is on the disk, which must not fill up.
+    """
     file = h5py.File(place, "w", libver=("earliest", "v108"), track_order=True, **driver)
     file.attrs["Conventions"] = CONVENTIONS
     file.attrs["format"] = FORMAT
@@ -148,15 +172,20 @@ def begin_file(place: Path | str, **driver: object) -> Any:
 
 
 def new_group(parent: Any, name: str) -> Any:
-    """A group, and those above it, that list their members in the order of writing."""
+    """Return a group, created with those above it unless they exist.
+
+    New groups list their members in the order of writing.
+    """
     for part in name.split("/"):
         parent = parent[part] if part in parent else parent.create_group(part, track_order=True)
     return parent
 
 
 def put(group: Any, name: str, values: Any, column: Column) -> Any:
-    """A dataset of numbers or texts. The scales of its dimensions must be there; a scale is its own
-    dimension."""
+    """Write a dataset of numbers or texts.
+
+    The scales of its dimensions must exist; a scale is its own dimension.
+    """
     return _described(group.create_dataset(name, data=_as_stored(values)), group, name, column)
 
 
@@ -179,7 +208,7 @@ def _described(dataset: Any, group: Any, name: str, column: Column) -> Any:
 
 
 def put_dimension(group: Any, name: str, length: int) -> None:
-    """A dimension without values, as the netCDF-4 library has them."""
+    """Write a dimension without values, as the netCDF-4 library does."""
     scale = group.create_dataset(name, (length,), ">f4")
     scale.make_scale(f"{WITHOUT_VALUES}{length:10d}")
 
@@ -192,8 +221,15 @@ def put_empty(
     column: Column,
     fill: int | None = None,
 ) -> Any:
-    """A contiguous dataset that has its place in the file now and is written by others; fill: its
-    first value, by default what the file system makes of a new file, zeros."""
+    """Create a contiguous dataset with space in the file, whose values are written later.
+
+    Parameters
+    ----------
+    group, name : where it is created.
+    shape, kind : of its values.
+    column : its dimensions and description.
+    fill : first value of all entries; by default zeros, which the file system returns for a new file.
+    """
     layout = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
     layout.set_layout(h5py.h5d.CONTIGUOUS)
     layout.set_obj_track_times(False)  # the same call gives the same bytes
@@ -208,8 +244,14 @@ def put_empty(
 
 
 def put_attributes(target: Any, values: Mapping[str, object]) -> None:
-    """Write attributes that are not there: numbers as float64 or int64, truth as int8 (netCDF-4 has
-    no booleans), lists of names as strings."""
+    """Write new attributes of a file, a group or a dataset.
+
+    Parameters
+    ----------
+    target : the HDF5 object.
+    values : by name. Numbers are stored as float64 or int64, booleans as int8 (netCDF-4 has none),
+        lists of names as texts.
+    """
     for name, value in values.items():
         if isinstance(value, str):
             # Nearly all are single texts, which the general way writes three times slower.
@@ -227,12 +269,21 @@ def put_attributes(target: Any, values: Mapping[str, object]) -> None:
 
 @contextmanager
 def new_file(path: Path, kind: str) -> Iterator[Any]:
-    """Create an HDF5 file of a kind, put in the place of `path` when all of it is written and on
-    the disk.
+    """Yield an HDF5 file in memory, which is written to `path` after the block.
 
-    It is made in memory: HDF5 does not survive a disk that fills up under it, a plain write does.
-    Raises StoreError where the file cannot be written; what stood there before then still stands.
-    Whether it may be replaced is decided before, by `may_extend`.
+    It is made in memory as HDF5 does not survive a disk that fills up, and a plain write does. If it
+    cannot be written, an earlier file at `path` is unchanged. Whether that may be replaced must be
+    decided before, by `may_extend`.
+
+    Parameters
+    ----------
+    path : of the file.
+    kind : of the file, for its trailer.
+
+    Raises
+    ------
+    StoreError
+        If the file cannot be written.
     """
     memory = {"driver": "core", "backing_store": False, "block_size": 1 << 20}
     with begin_file(f"{path.name}.{threading.get_ident()}", **memory) as file:
@@ -250,8 +301,7 @@ def new_file(path: Path, kind: str) -> Iterator[Any]:
 
 
 def _groups_with_arrays(group: Any, place: str = "") -> Iterator[str]:
-    """Yield the path of the group of each array below a group, in the order in which they were
-    written."""
+    """Yield the path of the group of each array below a group, in the order of writing."""
     for name, item in group.items():
         if is_group(item):
             yield from _groups_with_arrays(item, f"{place}/{name}" if place else name)

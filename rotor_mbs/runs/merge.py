@@ -1,4 +1,4 @@
-"""A file made to hold the rows that are asked for, beside those that it has; copies of a file."""
+"""Make a file hold requested rows beside those that it has, and copy files."""
 
 from __future__ import annotations
 
@@ -33,15 +33,31 @@ from rotor_mbs.runs.versions import machine, versions
 def fit_file_to_request(
     path: Path, wanted: Sequence[TableSpec], replaced: Collection[tuple[str, str, str]] = ()
 ) -> TableFile:
-    """Make the file hold the rows of `wanted` tables, beside those that it has.
+    """Make a results file hold the rows of requested tables beside those that it has.
 
-    replaced: (group, scene, curve or method) of stored rows that go where they are not wanted.
+    If the file has all rows as they are requested, nothing is written. Otherwise a file is laid out
+    beside it, the rows that stay are copied, and it replaces the old one. A row is missing afterwards
+    if anything in its design differs (settings, versions, the scene's numbers).
 
-    Where the file has all rows as they are asked for, nothing is written. Else a file is laid out
-    beside it, the rows that stay are copied, and it takes the place of the old one. A row of which
-    anything in the design differs (settings, versions, the scene's numbers) is missing afterwards.
-    Raises InputError where runs of a scene that has other numbers by now would be dropped and not
-    computed again, or the file holds something else, StoreError where it cannot be read or written.
+    Parameters
+    ----------
+    path : the results file; of a symbolic link the file that it points to.
+    wanted : the tables that are requested.
+    replaced : (group, scene, curve or method) of stored rows that are dropped if `wanted` has not
+        got them.
+
+    Returns
+    -------
+    TableFile
+        The tables of the file.
+
+    Raises
+    ------
+    InputError
+        If runs of a scene whose numbers have changed would be dropped and not computed again, or the
+        file is of another kind.
+    StoreError
+        If the file cannot be read or written.
     """
     if path.is_symlink():  # a link stays one
         path = path.resolve()
@@ -116,11 +132,20 @@ def fit_file_to_request(
 
 
 def copy_file(source: Path, target: Path) -> None:
-    """Copy a file with tables; one at `target` is replaced where the copy has all its rows, and is
-    of the same sweep.
+    """Copy a file with tables; replace one at the target only if no stored row is lost.
 
-    Raises InputError where rows would be lost, or `target` holds something else, StoreError where
-    it is damaged, not this program's, or cannot be written.
+    Parameters
+    ----------
+    source : the file.
+    target : the copy. A file there is replaced if it is of the same kind, and for a sweep of the
+        same sweep, and `source` has all its rows.
+
+    Raises
+    ------
+    InputError
+        If rows would be lost, or `target` is of another kind.
+    StoreError
+        If `target` is damaged, not of this program, or cannot be written.
     """
     with locked(target):
         if may_extend(target, read_trailer(source).kind):
@@ -147,7 +172,7 @@ def _known_rows(table: TableSpec | None) -> Mapping[str, Mapping[str, Any]]:
 
 
 def _is_same(stored: Mapping[str, Any], asked: Mapping[str, Any]) -> bool:
-    """Whether a row is as it is asked for; a number that it does not have is NaN in both."""
+    """Return whether a row is as it is requested; a missing number is NaN in both."""
     return stored.keys() == asked.keys() and all(
         value == asked[name] or (value != value and asked[name] != asked[name])
         for name, value in stored.items()
@@ -155,7 +180,7 @@ def _is_same(stored: Mapping[str, Any], asked: Mapping[str, Any]) -> bool:
 
 
 def _joined(before: TableSpec | None, made: TableSpec | None) -> dict[str, Column]:
-    """The computed columns of both, the checksum last."""
+    """Return the computed columns of two tables, the checksum last."""
     columns = {**(before.computed if before else {}), **(made.computed if made else {})}
     checksum = columns.pop("crc32", None)
     return columns if checksum is None else {**columns, "crc32": checksum}
@@ -164,7 +189,19 @@ def _joined(before: TableSpec | None, made: TableSpec | None) -> dict[str, Colum
 def _write_tables(
     path: Path, tables: Sequence[TableSpec], rows: Sequence[tuple[str, str, Rows]]
 ) -> TableFile:
-    """Write a new file with these tables; of its rows those that are given, the others blank."""
+    """Write a new file with tables, in which the given rows are filled and the others blank.
+
+    Parameters
+    ----------
+    path : of the file.
+    tables : all that it has.
+    rows : group and label of each row that is filled, and its columns.
+
+    Returns
+    -------
+    TableFile
+        The tables of the file.
+    """
     created = datetime.now(UTC).isoformat(timespec="seconds")
     count, scenes = 0, set[str]()
     others = sorted(

@@ -1,5 +1,8 @@
-"""Output files of every kind: under a temporary name until they are complete, never in place of
-another program's file, and written by one process at a time."""
+"""Write output files of every kind.
+
+A file has a temporary name until it is complete, does not replace the file of another program, and
+is written by one process at a time.
+"""
 
 from __future__ import annotations
 
@@ -27,8 +30,22 @@ _OWNER = rb"(process [0-9]+ on [!-~]*)?\Z"
 
 @contextmanager
 def locked(output: Path) -> Iterator[None]:
-    """Keep other processes from writing `output` in the block; its thread may enter it again.
-    Raises InputError, StoreError."""
+    """Keep other processes from writing a file in the block.
+
+    The thread may enter the lock of the same file again. Temporary files of processes that were
+    killed are removed.
+
+    Parameters
+    ----------
+    output : the file; a symbolic link and the file that it points to have one lock.
+
+    Raises
+    ------
+    InputError
+        If another process is writing the file, or its lock file is not one of this program.
+    StoreError
+        If the lock file cannot be written.
+    """
     from filelock import FileLock, Timeout
 
     place = _resolved(output)
@@ -76,7 +93,7 @@ def locked(output: Path) -> Iterator[None]:
 
 
 def is_being_written(output: Path) -> bool:
-    """Return whether another process writes a file now, or was killed while it did."""
+    """Return whether another process is writing a file, or was killed while it did."""
     return _lock_of(_resolved(output)).exists()
 
 
@@ -95,7 +112,7 @@ def _resolved(output: Path) -> Path:
 
 @contextmanager
 def store_errors(path: object) -> Iterator[None]:
-    """Raise what the system refuses in the block as a StoreError about `path`."""
+    """Raise an OSError of the block as a StoreError about `path`."""
     try:
         yield
     except OSError as exc:
@@ -105,8 +122,10 @@ def store_errors(path: object) -> Iterator[None]:
 
 
 def replace_file(path: Path, content: Buffer, mark: bytes) -> None:
-    """Write a file in the place of an earlier output of the same kind alone, see `write_file` and
-    `refuse_foreign`. Raises InputError, StoreError."""
+    """Write a file, which may replace only an earlier output of the same kind.
+
+    See `write_file` and `refuse_foreign`. Raises InputError, StoreError.
+    """
     refuse_foreign(path, mark)
     write_file(path, content)
 
@@ -114,8 +133,8 @@ def replace_file(path: Path, content: Buffer, mark: bytes) -> None:
 def write_file(path: Path, content: Buffer) -> None:
     """Write `content` under a temporary name beside `path`, force it to the disk, then rename it.
 
-    Of a symbolic link the file that it points to is replaced; a device or a pipe is written to.
-    Raises StoreError where it cannot be written.
+    A symbolic link stays, and the file that it points to is replaced; a device or a pipe is written
+    to. Raises StoreError if it cannot be written.
     """
     if path.exists() and not path.is_file() and not path.is_dir():
         with store_errors(path):
@@ -131,11 +150,21 @@ def write_file(path: Path, content: Buffer) -> None:
 
 
 def refuse_foreign(path: Path, mark: bytes) -> None:
-    """Raise InputError where `path` is a file that is no output of this program of the same kind.
-    For outputs that are no HDF5 files.
+    """Raise InputError if `path` is a file that is no output of this program of the same kind.
 
-    mark: a regular expression that is found in every output of the kind. An empty file may be
-    replaced.
+    For outputs that are no HDF5 files. An empty file may be replaced.
+
+    Parameters
+    ----------
+    path : the file, which may not exist.
+    mark : a regular expression that is found in every output of the kind.
+
+    Raises
+    ------
+    InputError
+        If the file is larger than any output, or has no such mark.
+    StoreError
+        If it cannot be read.
     """
     if not path.is_file():
         return
@@ -153,10 +182,19 @@ def refuse_foreign(path: Path, mark: bytes) -> None:
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """Yield the name of a new, empty file beside `path`, which takes its place after the block.
-    Raises StoreError.
+    """Yield the name of a new, empty file that replaces `path` after the block.
 
-    The name cannot be guessed, and a file or link of that name is not opened.
+    It is in the same folder. Its name cannot be guessed, and an existing file or link of that name is
+    not opened. If the block raises, `path` is unchanged.
+
+    Parameters
+    ----------
+    path : the file, which may not exist.
+
+    Raises
+    ------
+    StoreError
+        If `path` is a folder, or the system cannot write the file.
     """
     if path.is_dir():
         raise StoreError(f"{path}: is a folder; allowed: the name of a file")

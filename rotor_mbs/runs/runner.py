@@ -1,4 +1,4 @@
-"""The one loop that computes rows of a table: tasks to worker processes, their rows to the file.
+"""Compute rows of a table: send tasks to worker processes, and write their rows to the file.
 
 A run passes through `run_tasks_references_first`, `run_tasks`, `pool.run_in` and `TaskPool.submit`
 here, and in the worker process through `run_in_worker` and `RunTask.perform`.
@@ -26,12 +26,17 @@ _REPORTED = ("status", "message", "run_time_s")
 
 @dataclass(frozen=True)
 class RunOutcome:
-    """A run, or other rows of a study, that this call computed or tried to.
+    """A run, or other rows of a study, that this call computed or tried to compute.
 
-    status: of a run; "measured" for other rows; REFUSED where the method refused the scene.
-    seconds: run time; NaN where nothing was timed. is_stored: whether there is a row; else the same
-    call tries again. is_shipped: read from a shipped file and not computed. share: of the work of
-    the call that was done when it ended.
+    Attributes
+    ----------
+    label, method : of the run.
+    status : of a run; "measured" for other rows; REFUSED if the method refused the scene.
+    message : the reason of the status, if there is one.
+    seconds : run time in s; NaN if nothing was timed.
+    is_stored : whether there is a row; if not, the same call tries again.
+    is_shipped : whether it was read from a shipped file and not computed.
+    share : part of the work of the call that was done when it ended, from 0 to 1.
     """
 
     label: str
@@ -55,9 +60,13 @@ def ignore_progress(_done: int, _total: int, _outcome: RunOutcome) -> None:
 class Task(ABC):
     """Consecutive rows of a table, computed at once by one process.
 
-    label, method: in a line of progress. reference: where the row is that must be stored before.
-    kill_after_s: after which its process is ended, where it has not ended itself. work: roughly how
-    much there is to compute.
+    Attributes
+    ----------
+    label, method : of the line of progress.
+    place : location of the rows in the file.
+    reference : location of the row that must be stored before this task is computed.
+    kill_after_s : time in s after which the process is ended, if it has not ended the task itself.
+    work : rough amount of work, relative to that of other tasks.
     """
 
     label: str
@@ -74,24 +83,25 @@ class Task(ABC):
 
     @abstractmethod
     def perform(self) -> Rows:
-        """Compute its rows, in a worker process."""
+        """Compute the rows, in a worker process."""
 
     def store(self, rows: Rows) -> None:
-        """Write its rows into the file. Raises StoreError."""
+        """Write the rows into the file. Raises StoreError."""
         self.place.write(rows)
 
     def split(self) -> Sequence[Self]:
-        """Return tasks of its rows one by one; an empty sequence where it is one row, or cannot be
-        split."""
+        """Return a task for each row; an empty sequence if there is one row, or it cannot be split."""
         return ()
 
     def failed(self, status: str, message: str) -> Rows | None:  # noqa: ARG002
-        """Return the rows of a task that was ended or raised; None where nothing is stored, so that
-        it is tried again."""
+        """Return the rows of a task that was ended or raised an error.
+
+        None means that nothing is stored, so that the task is tried again.
+        """
         return None
 
     def outcome(self, rows: Rows) -> RunOutcome:
-        """Return how it ended, from what `run_tasks` gives of its rows."""
+        """Return the outcome of the task, from what `run_tasks` yields of its rows."""
         return RunOutcome(self.label, self.method, "measured", f"{len(rows['status'])} points")
 
 
@@ -99,14 +109,27 @@ T = TypeVar("T", bound=Task)
 
 
 def run_tasks(pool: TaskPool, tasks: Iterable[T]) -> Iterator[TaskEnd[T, Rows]]:
-    """Compute tasks in a pool that is open, and store their rows: by the worker where it sees the
-    file.
+    """Compute tasks in a pool and store their rows.
 
-    However the loop ends, the rows of what has ended are in the file. The `value` of a finished
-    task has at least the status and message of its stored rows, also where they are those of a
-    failure, and the run time where there is one; None where nothing is stored, and its failure and
-    message say why: REFUSED where the method refused the scene. Raises what a task raised of
-    InputError and StoreError.
+    The worker stores them if it sees the file, otherwise this process. However the loop ends, the
+    rows of all tasks that have ended are in the file.
+
+    Parameters
+    ----------
+    pool : a pool that is open.
+    tasks : taken as workers become free.
+
+    Yields
+    ------
+    TaskEnd
+        Its `value` has at least the status and message of the stored rows, also for a failure that is
+        stored, and the run time if there is one. It is None if nothing is stored; `failure` and
+        `message` then have the reason: REFUSED if the method refused the scene.
+
+    Raises
+    ------
+    InputError, StoreError
+        If a task raised it.
     """
     work = with_method_files(partial(run_in_worker, stores=pool.shares_disk))
     for end in run_in(pool, work, tasks, lambda task: task.kill_after_s, lambda task: task.split()):
@@ -129,8 +152,11 @@ def run_tasks(pool: TaskPool, tasks: Iterable[T]) -> Iterator[TaskEnd[T, Rows]]:
 
 
 def run_in_worker(task: Task, *, stores: bool) -> Rows:
-    """Compute the rows of a task in a worker process, and return them; where it `stores` them, as
-    it sees the file, only what is reported of them."""
+    """Compute the rows of a task in a worker process, and return them.
+
+    With `stores` they are written into the file, and only the columns that are reported are
+    returned.
+    """
     rows = task.perform()
     if not stores:
         return rows
@@ -141,10 +167,22 @@ def run_in_worker(task: Task, *, stores: bool) -> Rows:
 def run_tasks_references_first(
     tasks: Sequence[Task], pool: TaskPool, on_progress: OnProgress = ignore_progress
 ) -> list[RunOutcome]:
-    """Compute tasks as `run_tasks` does, references first; then the other rows whose reference is
-    stored, slow and fast ones in turn.
+    """Compute references first, then all other tasks whose reference is stored.
 
-    Returns what became of each task, in the order in which they ended.
+    Of these, slow and fast ones take turns.
+
+    Parameters
+    ----------
+    tasks : in any order.
+    pool : a pool that is open.
+    on_progress : called after each task with the number of tasks that have ended, the number of all,
+        and the outcome.
+
+    Returns
+    -------
+    list of RunOutcome
+        The outcome of each task, in the order in which they ended; those whose reference is missing
+        are last.
     """
     made: list[RunOutcome] = []
     total, done = sum(task.work for task in tasks), 0.0

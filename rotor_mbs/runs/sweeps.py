@@ -52,7 +52,7 @@ COLUMNS_OF_A_RUN = columns_in("sweep") | {
 
 
 def parameter_name(key: str) -> str:
-    """The variable of a varied parameter.
+    """Return the name of the variable of a varied parameter.
 
     >>> parameter_name("bearing.stiffness"), parameter_name("initial.angles[1]")
     ('bearing_stiffness', 'initial_angles_1')
@@ -61,13 +61,21 @@ def parameter_name(key: str) -> str:
 
 
 def code_of_method(method: str) -> int:
-    """CRC-32 of the versions that a run by this method has now."""
+    """Return a CRC-32 of the versions that a run by this method has now."""
     return zlib.crc32(json.dumps(row_versions(find_method(method)), sort_keys=True).encode())
 
 
 def sweep_table(sweep: Sweep, methods: Sequence[str], numbers: range) -> TableSpec:
-    """Return the table of the runs `numbers` of a sweep; run r is row r mod rows of the design, by
-    method r div rows."""
+    """Return the table of a range of runs of a sweep.
+
+    Run r is row r mod rows of the design, by method r div rows.
+
+    Parameters
+    ----------
+    sweep : the design, its keys and its outputs.
+    methods : names of the methods, in the order of their codes.
+    numbers : of the runs, a range with step 1.
+    """
     runs, rows, options = np.arange(numbers.start, numbers.stop), sweep.design.count, sweep.design
     known: dict[str, tuple[Column, Any]] = {}
     values = sweep.design.rows(numbers.start, numbers.stop)
@@ -108,13 +116,30 @@ def open_sweep(
     *,
     fresh: bool = False,
 ) -> Iterator[tuple[StoredTable, NDArray[np.int8]]]:
-    """Open the file `output`, laid out where it is not there, which no other process writes in the
-    block: its table, and (runs,) their statuses, MISSING where they are to be computed.
+    """Open the file of a sweep, which no other process writes in the block.
 
-    time_limit_s: runs that a shorter limit ended are missing. fresh: all runs are to be computed;
-    what is stored of one stays until it is. Raises InputError where the output holds something
-    else, or another process is writing it, StoreError where it cannot be read or written, or the
-    disk has no room for all runs.
+    It is laid out if it does not exist, and removed after the block if nothing was stored in a new
+    file.
+
+    Parameters
+    ----------
+    output : the file.
+    table : the table of its runs.
+    attributes : of a new file; the identity of the sweep among them must be that of the file.
+    time_limit_s : runs that were ended by a shorter limit, in s, count as missing.
+    fresh : whether all runs are to be computed. A stored run stays until it is replaced.
+
+    Yields
+    ------
+    StoredTable, (runs,) int8
+        The table, and the status of each run, MISSING if it is to be computed.
+
+    Raises
+    ------
+    InputError
+        If the file is of another kind or another sweep, or another process is writing it.
+    StoreError
+        If it cannot be read or written, or the disk has no room for all runs.
     """
     with locked(output):
         path = output.resolve() if output.is_symlink() else output  # a link stays one
@@ -145,14 +170,28 @@ def open_sweep(
 
 
 class StoredSweep:
-    """A dataset that `rotor-mbs sweep` wrote, complete or not. Raises StoreError where it is none,
-    or is damaged; with allow_damaged_runs, not where only runs are.
+    """The dataset of a sweep in a file, complete or not.
 
-    columns: every dataset, scales included. keys: of the varied parameters. damaged_runs: numbers
-    of the stored runs that are not what was written, by their checksums.
+    Attributes
+    ----------
+    columns : every dataset by name, scales included.
+    keys : of the varied parameters.
+    damaged_runs : numbers of the stored runs whose checksums are wrong.
     """
 
     def __init__(self, path: Path, *, allow_damaged_runs: bool = False) -> None:
+        """Read the dataset, and verify all its runs.
+
+        Parameters
+        ----------
+        path : the file.
+        allow_damaged_runs : whether damaged runs raise no error.
+
+        Raises
+        ------
+        StoreError
+            If the file is no sweep's, or is damaged.
+        """
         self._path = path
         file = TableFile(path, [""])
         self.attributes = file.attributes
@@ -183,7 +222,7 @@ class StoredSweep:
             )
 
     def _check(self) -> None:
-        """Raise StoreError where something is missing, or does not fit, that every sweep has."""
+        """Raise StoreError if something that every sweep has is missing or inconsistent."""
         table, place = self._table, str(self._path)
         texts = ("title", "summary", "sweep_toml", "base_scene", "scene_toml", "scene_hash")
         require_texts(self.attributes, texts, place)
@@ -215,30 +254,33 @@ class StoredSweep:
 
     @functools.cached_property
     def base_scene(self) -> Scene:
-        """The scene that is varied. Raises InputError where its text is none."""
+        """Return the scene that is varied. Raises InputError if its text is no scene."""
         return parse_scene(str(self.attributes["scene_toml"]), str(self.attributes["base_scene"]))
 
     @property
     def methods(self) -> list[str]:
+        """Return the names of the methods, in the order of their codes."""
         names: list[str] = self.attributes["methods"]
         return names
 
     def column(self, name: str) -> NDArray[Any]:
-        """A dataset; computed ones as they lie in the file, read where they are indexed. Raises
-        StoreError."""
+        """Return a dataset; a computed one is read from the file when it is indexed.
+
+        Raises StoreError if there is none of that name.
+        """
         if name not in self.columns:
             what = f"has no {shown_value(name)}"
             raise StoreError(f"{self._path}: {what}; allowed: a sweep whose outputs have it")
         return self._table.column(name)
 
     def scene_of(self, number: int) -> Scene:
-        """Return the scene of one of its runs, at the samples that are stored."""
+        """Return the scene of the run with a number, at the samples that are stored."""
         row = self._row_of(number)
         values = {key: float(self.column(parameter_name(key))[row]) for key in self.keys}
         return self.base_scene.replace(**values, samples=len(self.column("time")))
 
     def run(self, number: int) -> StoredRun:
-        """Return one of its runs."""
+        """Return the run with a number."""
         row = self._row_of(number)
         scales = {name: values for name, (_, values) in self._table.known.items() if name in SCALES}
         method = self.methods[int(self.column("method_code")[row])]

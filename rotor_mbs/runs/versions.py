@@ -1,5 +1,4 @@
-"""What the results depend on besides scene and method: versions, machine, and the program's own
-code."""
+"""Describe what results depend on besides scene and method: versions, machine, code."""
 
 from __future__ import annotations
 
@@ -29,15 +28,19 @@ _WITHOUT_EFFECT = re.compile(
 
 
 def versions() -> dict[str, str]:
-    """Versions of this package, of the engines and libraries ("not installed" where one is
-    missing), and of Python."""
+    """Return the versions of this package, of engines and libraries, and of Python.
+
+    An engine or library that is missing has the version "not installed".
+    """
     return versions_with(*(name for method in methods() for name in method.distributions))
 
 
 @functools.cache
 def versions_with(*distributions: str) -> dict[str, str]:
-    """Versions of this package, of Python, of the libraries that every method uses, and of
-    `distributions`."""
+    """Return the versions of this package, of Python, of common libraries and of `distributions`.
+
+    The common libraries are those that every method uses.
+    """
     known = {"rotor_mbs": rotor_mbs.__version__, "python": platform.python_version()}
     for name in dict.fromkeys((*distributions, *_LIBRARIES)):
         try:
@@ -48,16 +51,17 @@ def versions_with(*distributions: str) -> dict[str, str]:
 
 
 def row_versions(method: Method) -> dict[str, str]:
-    """What computes a run by this method: versions, a digest of the code, and one of a plug-in's
-    own code."""
+    """Return what computes a run by this method: versions and digests of the code.
+
+    The digests are those of this package's numerics, and of a plug-in's own code.
+    """
     own = {"plug-in": code_digest(tuple(method.sources))} if method.sources else {}
     return {**versions_with(*method.distributions), "code": numerics_digest(), **own}
 
 
 @functools.cache
 def machine() -> dict[str, str]:
-    """Operating system and processor, as the system reports them; the cores that this process may
-    use."""
+    """Return the operating system, and the processor with the cores this process may use."""
     processor, information = platform.processor() or platform.machine(), Path("/proc/cpuinfo")
     if information.is_file():
         named = re.search(
@@ -87,8 +91,7 @@ _MADE_WITH = (
 
 
 def made_with(attributes: Mapping[str, object]) -> list[tuple[str, str]]:
-    """Return (what, version) of the programs and the computer that made a file, and when, from its
-    attributes."""
+    """Return (what, version) of the programs and the machine that made a file, and the time."""
     made = [(name, str(attributes[name])) for name in _MADE_WITH if attributes.get(name)]
     created = str(attributes.get("created", ""))
     if created:
@@ -98,7 +101,7 @@ def made_with(attributes: Mapping[str, object]) -> list[tuple[str, str]]:
 
 @functools.cache
 def numerics_digest() -> str:
-    """Of the part of this package that decides a run's numbers."""
+    """Return a digest of the part of this package that decides a run's numbers."""
     package = Path(rotor_mbs.__file__).parent
     return code_digest(
         tuple(path for part in NUMERICS for path in sorted((package / part).rglob("*.py")))
@@ -107,8 +110,17 @@ def numerics_digest() -> str:
 
 @functools.cache
 def code_digest(sources: tuple[Path | str, ...]) -> str:
-    """Twelve hexadecimal digits of a SHA-256 over source files, or texts, without comments,
-    docstrings and empty lines."""
+    """Return a digest of source code without comments, docstrings and empty lines.
+
+    Parameters
+    ----------
+    sources : paths of source files, or texts.
+
+    Returns
+    -------
+    str
+        Twelve hexadecimal digits of a SHA-256.
+    """
     digest = hashlib.sha256()
     for source in sources:
         code = (
