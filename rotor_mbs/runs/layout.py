@@ -54,8 +54,8 @@ def create_file(
 ) -> Iterator[TableFile]:
     """Yield a new file with room for all rows of tables, under a temporary name.
 
-    After the block it is complete under its name, or it does not exist. Its space is reserved twice:
-    HDF5 fails without an error if the disk fills up, and truncates the file when it begins.
+    After the block it is complete under its name, or it does not exist. Its space is reserved
+    twice: HDF5 does not survive a disk that fills up, and it truncates the file when it begins.
 
     Parameters
     ----------
@@ -228,7 +228,8 @@ def put_empty(
     group, name : where it is created.
     shape, kind : of its values.
     column : its dimensions and description.
-    fill : first value of all entries; by default zeros, which the file system returns for a new file.
+    fill : first value of all entries; by default zeros, which the file system returns for a new
+        file.
     """
     layout = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
     layout.set_layout(h5py.h5d.CONTIGUOUS)
@@ -271,9 +272,9 @@ def put_attributes(target: Any, values: Mapping[str, object]) -> None:
 def new_file(path: Path, kind: str) -> Iterator[Any]:
     """Yield an HDF5 file in memory, which is written to `path` after the block.
 
-    It is made in memory as HDF5 does not survive a disk that fills up, and a plain write does. If it
-    cannot be written, an earlier file at `path` is unchanged. Whether that may be replaced must be
-    decided before, by `may_extend`.
+    It is made in memory as HDF5 does not survive a disk that fills up, and a plain write does. If
+    it cannot be written, an earlier file at `path` is unchanged. Whether that may be replaced must
+    be decided before, by `may_extend`.
 
     Parameters
     ----------

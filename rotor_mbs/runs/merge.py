@@ -36,8 +36,8 @@ def fit_file_to_request(
     """Make a results file hold the rows of requested tables beside those that it has.
 
     If the file has all rows as they are requested, nothing is written. Otherwise a file is laid out
-    beside it, the rows that stay are copied, and it replaces the old one. A row is missing afterwards
-    if anything in its design differs (settings, versions, the scene's numbers).
+    beside it, the rows that stay are copied, and it replaces the old one. A row is missing
+    afterwards if anything in its design differs (settings, versions, the scene's numbers).
 
     Parameters
     ----------
@@ -54,8 +54,8 @@ def fit_file_to_request(
     Raises
     ------
     InputError
-        If runs of a scene whose numbers have changed would be dropped and not computed again, or the
-        file is of another kind.
+        If runs of a scene whose numbers have changed would be dropped and not computed again, or
+        the file is of another kind.
     StoreError
         If the file cannot be read or written.
     """

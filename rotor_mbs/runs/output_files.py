@@ -184,8 +184,8 @@ def refuse_foreign(path: Path, mark: bytes) -> None:
 def replacing(path: Path) -> Iterator[Path]:
     """Yield the name of a new, empty file that replaces `path` after the block.
 
-    It is in the same folder. Its name cannot be guessed, and an existing file or link of that name is
-    not opened. If the block raises, `path` is unchanged.
+    It is in the same folder. Its name cannot be guessed, and an existing file or link of that name
+    is not opened. If the block raises, `path` is unchanged.
 
     Parameters
     ----------

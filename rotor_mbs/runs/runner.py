@@ -90,7 +90,7 @@ class Task(ABC):
         self.place.write(rows)
 
     def split(self) -> Sequence[Self]:
-        """Return a task for each row; an empty sequence if there is one row, or it cannot be split."""
+        """Return a task for each row; none if there is only one row, or they cannot be split."""
         return ()
 
     def failed(self, status: str, message: str) -> Rows | None:  # noqa: ARG002
@@ -122,8 +122,8 @@ def run_tasks(pool: TaskPool, tasks: Iterable[T]) -> Iterator[TaskEnd[T, Rows]]:
     Yields
     ------
     TaskEnd
-        Its `value` has at least the status and message of the stored rows, also for a failure that is
-        stored, and the run time if there is one. It is None if nothing is stored; `failure` and
+        Its `value` has at least the status and message of the stored rows, also for a failure that
+        is stored, and the run time if there is one. It is None if nothing is stored; `failure` and
         `message` then have the reason: REFUSED if the method refused the scene.
 
     Raises
@@ -175,8 +175,8 @@ def run_tasks_references_first(
     ----------
     tasks : in any order.
     pool : a pool that is open.
-    on_progress : called after each task with the number of tasks that have ended, the number of all,
-        and the outcome.
+    on_progress : called after each task with the number of tasks that have ended, the number of
+        all, and the outcome.
 
     Returns
     -------
