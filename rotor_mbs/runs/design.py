@@ -41,8 +41,10 @@ ONCE_A_SCENE = ("angle_uncertainty", "error_growth")  # stored once a scene, ove
 
 
 def flags(names: Sequence[str], first: int = 0) -> dict[str, Any]:
-    """Return the attributes of a column of codes, as CF has them: what each code from `first` on
-    means."""
+    """Return the CF attributes of a column of codes.
+
+    They say what each code from `first` on means.
+    """
     return {
         "flag_values": np.arange(first, first + len(names), dtype=np.int8),
         "flag_meanings": " ".join(names),
@@ -140,7 +142,10 @@ COLUMNS["status"] = COLUMNS["status"]._replace(attributes=flags(("missing", *STA
 
 
 def columns_in(table: str) -> dict[str, Column]:
-    """Return the computed columns of a table with a value a row, by its name, see `RowValue`."""
+    """Return the computed columns with one value per row of a table, by its name.
+
+    See `RowValue`.
+    """
     return {
         name: COLUMNS[name] for name, value in _ROW_VALUES.items() if table in value.tables.split()
     }
@@ -172,10 +177,14 @@ POINT_COLUMNS: Mapping[str, Mapping[str, Column]] = {
 
 @dataclass(frozen=True)
 class RunRequest:
-    """A run as it is asked for: a row of the design.
+    """A run as it is requested: a row of the design.
 
-    versions: of what computes it, by default those of this installation; of a reference that is
-    read from a shipped file also who computed it (`frozen_with`).
+    Attributes
+    ----------
+    scene : the scene.
+    method, settings : name of the method, and its settings that are not the default ones.
+    versions : of what computes it, by default those of this installation; of a reference that is
+        read from a shipped file also who computed it (`frozen_with`).
     """
 
     scene: Scene
@@ -185,6 +194,7 @@ class RunRequest:
 
     @property
     def is_shipped(self) -> bool:
+        """Return whether the run is a reference that is read from a shipped file."""
         return self.versions is not None and "frozen_with" in self.versions
 
     @property
@@ -194,6 +204,7 @@ class RunRequest:
 
     @property
     def reference_label(self) -> str:
+        """Return the label of the row of the scene's reference."""
         return f"{self.scene.name}/{REFERENCE}"
 
     @property
@@ -211,7 +222,12 @@ class RunRequest:
 
 
 def metric_columns(outputs: Iterable[str]) -> dict[str, Column]:
-    """Return the computed columns of /runs for scenes that ask for these outputs."""
+    """Return the computed columns of /runs for scenes with these outputs.
+
+    Parameters
+    ----------
+    outputs : names of outputs of scenes.
+    """
     columns = columns_in(RUNS)
     for quantity in quantities(outputs):
         name, long_name = quantity.name, quantity.long_name
@@ -237,7 +253,12 @@ def metric_columns(outputs: Iterable[str]) -> dict[str, Column]:
 
 
 def arrays_of(run: RunRequest) -> dict[str, Column]:
-    """Return the arrays over time that a run stores, by their name in the file."""
+    """Return the columns of the arrays over time that a run stores, by name.
+
+    Parameters
+    ----------
+    run : the request; what is stored depends on the scene's outputs and the method.
+    """
     method = find_method(run.method)
     # A reference is read back by its angles and rates, whatever the scene asks for.
     outputs = (
@@ -264,15 +285,14 @@ class TableSpec:
 
     Attributes
     ----------
-    group : where it stands in the file; "" for the root.
-    runs : (rows,) the scale `run`: texts that tell the rows apart, or their numbers.
+    group : its path in the file; "" for the root.
+    runs : (rows,) the scale `run`: unique texts, or numbers.
     known : by name, column and values of the other dimensions' scales, and of what the design says
         of each row.
     computed : columns that are computed, in the order in which the checksum of a row covers them.
-        One without the
-        dimension `run` belongs to the reference.
+        One without the dimension `run` belongs to the reference.
     attributes : of the group.
-    characters : of each computed text.
+    characters : length of each computed text.
     """
 
     group: str
@@ -284,7 +304,7 @@ class TableSpec:
 
     @functools.cached_property
     def row_type(self) -> np.dtype[np.void]:
-        """The computed columns of one row, in the order in which its checksum covers them."""
+        """Return the type of one row: its computed columns in the order of its checksum."""
         lengths = {name: len(values) for name, (_, values) in self.known.items()} | {
             CHARACTERS: self.characters
         }
@@ -297,13 +317,13 @@ class TableSpec:
         )
 
     def shape(self, name: str) -> tuple[int, ...]:
-        """Of a computed column."""
+        """Return the shape of a computed column."""
         rows = (len(self.runs),) if "run" in self.computed[name].dimensions else ()
         return (*rows, *self.row_type[name].shape)
 
     @functools.cached_property
     def known_rows(self) -> Mapping[str, Mapping[str, Any]]:
-        """By run, what the design says of it."""
+        """Return what the design says of each run, by run."""
         columns = {name: list(values) for name, (_, values) in self.known.items()}
         return {
             str(run): {name: values[i] for name, values in columns.items()}
@@ -312,12 +332,17 @@ class TableSpec:
 
     @functools.cached_property
     def row_of(self) -> Mapping[str, int]:
-        """By run, the number of its row."""
+        """Return the number of the row of each run, by run."""
         return {str(run): row for row, run in enumerate(self.runs)}
 
 
 def known_columns(rows: Sequence[Mapping[str, object]]) -> dict[str, tuple[Column, Any]]:
-    """`known` of a table with these rows, texts and numbers by name, all with the same names."""
+    """Return the `known` columns of a table.
+
+    Parameters
+    ----------
+    rows : texts and numbers by name; all rows have the same names.
+    """
     columns: dict[str, tuple[Column, Any]] = {}
     for name, (units, long_name) in DESIGN_COLUMNS.items():
         if rows and name in rows[0]:
@@ -331,7 +356,13 @@ def known_columns(rows: Sequence[Mapping[str, object]]) -> dict[str, tuple[Colum
 
 
 def scene_scales(scene: Scene, columns: Iterable[Column]) -> dict[str, tuple[Column, Any]]:
-    """The scales of a table with these columns over a scene's samples, as part of `known`."""
+    """Return the scales of a table over a scene's samples, as part of its `known` columns.
+
+    Parameters
+    ----------
+    scene : the scene.
+    columns : of the table; only scales that one of them has are returned, and time.
+    """
     used = {"time"}.union(*(column.dimensions for column in columns))
     values = scale_values(scene)
     attributes: dict[str, Any] = {
@@ -349,7 +380,7 @@ def scene_scales(scene: Scene, columns: Iterable[Column]) -> dict[str, tuple[Col
 
 
 def runs_table(asked: Sequence[RunRequest]) -> TableSpec:
-    """The table /runs of a file with these runs."""
+    """Return the table /runs of a file with these runs."""
     outputs = dict.fromkeys(output for run in asked for output in run.scene.outputs)
     known = known_columns([run.known for run in asked])
     return TableSpec(
@@ -358,8 +389,13 @@ def runs_table(asked: Sequence[RunRequest]) -> TableSpec:
 
 
 def scene_table(runs: Sequence[RunRequest], arrays: Collection[str] | None = None) -> TableSpec:
-    """Return the table of the arrays of one scene's runs. arrays: names of those that are stored,
-    by default all."""
+    """Return the table of the arrays of one scene's runs.
+
+    Parameters
+    ----------
+    runs : all of one scene.
+    arrays : names of the arrays that are stored, by default all.
+    """
     scene = runs[0].scene
     computed = {
         name: column
@@ -385,7 +421,7 @@ def scene_table(runs: Sequence[RunRequest], arrays: Collection[str] | None = Non
 
 
 def results_tables(asked: Sequence[RunRequest]) -> list[TableSpec]:
-    """All tables of a file with these runs: /runs, then the arrays of each scene."""
+    """Return all tables of a file with these runs: /runs, then the arrays of each scene."""
     asked = sorted(asked, key=lambda run: row_order(run.label))
     by_scene: dict[str, list[RunRequest]] = {}
     for run in asked:
@@ -397,8 +433,10 @@ def results_tables(asked: Sequence[RunRequest]) -> list[TableSpec]:
 
 
 def row_order(run: str) -> tuple[Any, ...]:
-    """Scenes in natural order; of each the reference, then methods in the order of the
-    catalogue."""
+    """Return a sort key of the label of a run.
+
+    Scenes are in natural order, in each the reference, then methods in the order of the catalogue.
+    """
     scene, method = (
         (run.removesuffix(f"/{REFERENCE}"), REFERENCE)
         if run.endswith(f"/{REFERENCE}")

@@ -1,4 +1,4 @@
-"""Where the tasks of a sweep run: `--engine`, worker processes of this machine or a cluster."""
+"""Open what runs the tasks of a sweep (`--engine`): processes of this machine or a cluster."""
 
 from __future__ import annotations
 

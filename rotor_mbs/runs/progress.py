@@ -32,14 +32,18 @@ _STATUS = re.compile(rf"\b({'|'.join((*STATUSES, 'no_reference'))})\b")
 
 
 def coloured(text: str, stream: TextIO) -> str:
-    """Return a text with each status in its colour: on a terminal, unless the user asks for none
-    (https://no-color.org)."""
+    """Return a text with each status in its colour.
+
+    Nothing is coloured unless the stream is a terminal, and the user has not set NO_COLOR
+    (https://no-color.org).
+    """
     if not stream.isatty() or "NO_COLOR" in os.environ:
         return text
     return _STATUS.sub(lambda found: f"\x1b[{_COLOURS.get(found[0], _BAD)}m{found[0]}\x1b[0m", text)
 
 
 def span(seconds: float) -> str:
+    """Return a duration as text in a suitable unit, "2.5 h"."""
     for length, unit in ((86400.0, "days"), (3600.0, "h"), (60.0, "min")):
         if seconds >= 2.0 * length:
             return f"{seconds / length:.1f} {unit}"
@@ -47,11 +51,10 @@ def span(seconds: float) -> str:
 
 
 class ProgressLine:
-    """One line that renews itself on a terminal, plain lines in a log. A context manager that
-    clears it.
+    """A context manager that shows progress: one line on a terminal, or plain lines in a log.
 
-    Called after each run. What is left is estimated from the work done, not from the number of
-    runs.
+    The line on a terminal is overwritten, and cleared at the end. The object is called after each
+    run. The remaining time is estimated from the work done, not from the number of runs.
     """
 
     def __init__(self, stream: TextIO | None = None) -> None:
@@ -85,8 +88,10 @@ class ProgressLine:
         self._show(text if keep else self._estimate(outcome.share) + text, keep=keep)
 
     def stage(self, name: str, done: int, total: int, note: str = "") -> None:
-        """Show work that has no outcomes of its own, such as drawing pages: called before the first
-        and after each."""
+        """Show the progress of a stage whose parts have no outcomes, such as drawing pages.
+
+        It is called before the first part and after each.
+        """
         now = time.monotonic()
         if name != self._stage:
             self._stage, self._stage_start, self._share_before = name, now, done / total
@@ -96,8 +101,11 @@ class ProgressLine:
         self._show(f"{self._estimate(done / total)}{name} {done}/{total}{note}")
 
     def runs(self, done: int, total: int, statuses: Counter[str]) -> None:
-        """Show how many runs of a sweep have been computed, with which status: called before the
-        first and after each block of runs."""
+        """Show how many runs of a sweep have been computed, and how many failed with which status.
+
+        It is called before the first block of runs and after each; `statuses` are those of the
+        block.
+        """
         self._statuses.update(statuses)
         failed = [
             f", {count} {status}"
@@ -107,14 +115,14 @@ class ProgressLine:
         self.stage("runs", done, total, "".join(failed))
 
     def _estimate(self, share: float) -> str:
-        """Return "40%, about 20 s left  ", or "" where the line does not renew itself."""
+        """Return "40%, about 20 s left  ", or "" in a log or without an estimate."""
         if not self._is_live or not self._share_before < share < 1.0:
             return ""
         left = (self._last - self._stage_start) / (share - self._share_before) * (1.0 - share)
         return f"{share:4.0%}, about {span(left)} left  "
 
     def _show(self, text: str, *, keep: bool = False) -> None:
-        """Show a text; keep: it stays on the terminal, whole."""
+        """Show a text; with `keep` it stays on the terminal in full length."""
         text = printable(text)
         if not self._is_live:
             self._print(text)
@@ -135,14 +143,16 @@ class ProgressLine:
         self._print("\r\x1b[K", end="")
 
     def _print(self, text: str, end: str = "\n") -> None:
-        """Print a line, and go on where nobody can read it any more."""
+        """Print a line, and ignore a failure, as on a closed stream."""
         with suppress(OSError, ValueError):
             print(text, end=end, file=getattr(self._stream, "unfiltered", self._stream), flush=True)
 
 
 class NotebookLine(ProgressLine):
-    """A line below a cell of a Jupyter notebook, which renews itself; in the end it tells how long
-    the call took."""
+    """A line below a cell of a Jupyter notebook that is overwritten.
+
+    At the end it shows how long the call took.
+    """
 
     def __init__(self) -> None:
         super().__init__()
@@ -168,7 +178,7 @@ class NotebookLine(ProgressLine):
 
 
 class SilentProgress(ProgressLine):
-    """A progress that shows nothing, and needs no stream."""
+    """A progress line that shows nothing, and needs no stream."""
 
     def __init__(self) -> None:
         with io.StringIO() as nowhere:
@@ -185,13 +195,12 @@ class SilentProgress(ProgressLine):
 
 
 def progress_of_call(progress: bool | None) -> ProgressLine:
-    """Return what shows the progress of a call in Python.
+    """Return the object that shows the progress of a call in Python.
 
     Parameters
     ----------
     progress : whether to show it; None: on a terminal and in a notebook, but not in a script whose
-        messages go to a
-        file.
+        messages go to a file.
     """
     if progress is False:
         return SilentProgress()

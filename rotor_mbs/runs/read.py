@@ -1,5 +1,7 @@
-"""Results files read back: scenes and runs by name, rows when they are asked for; of a run also
-what was stored, its Solution, so that it can be judged again. Needs no engine.
+"""Read scenes, runs and records from results files; write records.
+
+A row is read when something of it is used. A run can be returned as the Solution that was stored,
+so that it can be judged again. No engine is needed.
 
 What studies store beside runs are records: tables of points, and groups of arrays with dimensions
 of their own.
@@ -67,14 +69,15 @@ _TEXTS = ("message", "engine_message")
 
 @dataclass(frozen=True, eq=False)
 class StoredRun:
-    """A run, or the reference, or a run of a sweep, in a file; its row is read, and verified, when
-    something of it is asked for.
+    """A run in a file: of a method, the reference, or of a sweep.
+
+    Its row is read, and verified, when something of it is used.
 
     Attributes
     ----------
     scene, method : names.
-    known : what the design says of it: settings, versions, ...
-    scales : time, coordinate, blade, axis, as far as there are.
+    known : columns of the design by name: settings, versions, ...
+    scales : time, coordinate, blade, axis, as far as they exist.
     """
 
     scene: str
@@ -93,13 +96,13 @@ class StoredRun:
 
     @functools.cached_property
     def is_damaged(self) -> bool:
-        """Return whether its row is not what was written."""
+        """Return whether the checksum of its row is wrong."""
         row = self._stored
         return bool((checksums(self._place.first, row, self._place.row_type) != row["crc32"]).any())
 
     @functools.cached_property
     def _row(self) -> Rows:
-        """Return the columns of its row. Raises StoreError where they are not what was written."""
+        """Return the columns of its row. Raises StoreError if their checksum is wrong."""
         if self._verify and self.is_damaged:
             raise StoreError(f"{self._name} changed after it was written")
         return {name: values[0] for name, values in self._stored.items()}
@@ -110,8 +113,10 @@ class StoredRun:
 
     @functools.cached_property
     def attributes(self) -> dict[str, Any]:
-        """Return status, message, metrics, times ... as plain values; those that the run does not
-        have are left out."""
+        """Return status, message, metrics, times ... of the run as plain values, by name.
+
+        Those that the run does not have are left out.
+        """
         facts: dict[str, Any] = {"status": self.status, "settings": self.known["settings"]}
         facts |= {name: text_of(self._row[name]) for name in _TEXTS if name in self._row}
         for name, value in self._row.items():
@@ -131,23 +136,27 @@ class StoredRun:
 
     @property
     def status(self) -> str:
+        """Return the name of its status."""
         code = int(self._row["status"])
         return STATUSES[code] if 0 <= code < len(STATUSES) else ""
 
     @property
     def settings(self) -> dict[str, Any]:
+        """Return the settings of its method. Raises StoreError if they are damaged."""
         return parsed(self.known["settings"], dict, self._name)
 
     @property
     def labels(self) -> list[str]:
-        """Return the names of the coordinates: rotor, pitch 1, ...; none where neither angles nor
-        rates are stored."""
+        """Return the names of the coordinates: rotor, pitch 1, ...
+
+        They are none if neither angles nor rates are stored.
+        """
         is_known = "angles" in self or "rates" in self
         return list(coordinate_labels(len(self.scales["coordinate"]) - 1)) if is_known else []
 
     @functools.cached_property
     def samples(self) -> int:
-        """Return the number of samples up to which the run came."""
+        """Return the number of samples that the run computed."""
         if not self._is_of_sweep:
             return int(self._row["samples"])
         # Its arrays are NaN after a run broke off.
@@ -166,7 +175,7 @@ class StoredRun:
 
     @property
     def _own_arrays(self) -> dict[str, NDArray[Any]]:
-        """Return its arrays by name, with the rows after its end."""
+        """Return its arrays by name, including the rows after its last sample."""
         return {
             name: values
             for name, values in self._row.items()
@@ -175,8 +184,11 @@ class StoredRun:
 
     @functools.cached_property
     def _arrays(self) -> dict[str, NDArray[Any]]:
-        """Return its arrays by name, scales included. One that its method or its scene's outputs do
-        not have is NaN in all samples, and left out."""
+        """Return its arrays by name, scales included, up to its last sample.
+
+        An array that its method or its scene's outputs do not have is NaN in all samples, and left
+        out.
+        """
         count = self.samples
         scales = {
             name: values[:count] if name == "time" else values
@@ -196,19 +208,26 @@ class StoredRun:
         return name in self._arrays
 
     def array(self, name: str) -> NDArray[Any]:
-        """Return an array or a scale, (samples, ...). Raises StoreError where the run has none of
-        that name."""
+        """Return an array or a scale, (samples, ...). Raises StoreError if the run has none."""
         if name not in self:
             raise StoreError(f"{self._name} has no {name}")
         return self._arrays[name]
 
     def get(self, name: str) -> NDArray[Any] | None:
+        """Return an array or a scale, or None if the run has none of that name."""
         return self._arrays.get(name)
 
     def faults(self, scene: Scene, *, complete: bool = True) -> list[str]:
-        """Return a line for every array that is missing or wrong; complete: every sample must be
-        there, else as many as there are times. A frozen reference need not have what follows from
-        its angles and rates, a method that is not built in no more than these."""
+        """Return a line for every array that is missing or wrong.
+
+        A frozen reference needs only its angles, rates and what cannot be derived from them; a
+        method that is not built in needs only angles and rates.
+
+        Parameters
+        ----------
+        scene : the scene of the run.
+        complete : whether every sample must exist; if not, as many as there are times.
+        """
         faults = []
         rows = len(self.array("time")) if "time" in self else scene.samples
         if complete and rows != scene.samples:
@@ -243,8 +262,10 @@ class StoredRun:
         return faults
 
     def trajectory(self, scene: Scene) -> Trajectory | None:
-        """Return its samples; None where its arrays cannot be used. Angles and rates that are not
-        stored are NaN."""
+        """Return the samples of the run, or None if its arrays cannot be used.
+
+        Angles and rates that are not stored are NaN.
+        """
         if self.faults(scene, complete=False):
             return None
         time = self.array("time")
@@ -254,7 +275,12 @@ class StoredRun:
         return Trajectory(**{"time": time, "angles": blank, "rates": blank, **arrays})
 
     def solution(self, scene: Scene) -> Solution | None:
-        """Return the run with what was stored of it; None where its arrays cannot be used."""
+        """Return the run as the Solution that was stored, or None if its arrays cannot be used.
+
+        Parameters
+        ----------
+        scene : the scene of the run.
+        """
         trajectory, facts = self.trajectory(scene), self.attributes
         if trajectory is None:
             return None
@@ -287,8 +313,14 @@ class StoredRun:
 
 @dataclass(frozen=True)
 class StoredScene:
-    """A scene in an open file: name, attributes (title, figures, blades, scene_toml, scene_hash)
-    and its runs, the reference first, then methods in the order of the catalogue."""
+    """A scene in an open file.
+
+    Attributes
+    ----------
+    name : of the scene.
+    attributes : title, figures, blades, scene_toml, scene_hash.
+    runs : by name of the method; the reference first, then methods in the order of the catalogue.
+    """
 
     name: str
     attributes: dict[str, Any]
@@ -296,81 +328,93 @@ class StoredScene:
 
     @functools.cached_property
     def scene(self) -> Scene:
-        """Return the scene that its text describes. Raises InputError where its text is no
-        scene."""
+        """Return the scene that its text describes. Raises InputError if it is no scene."""
         return parse_scene(str(self.attributes["scene_toml"]), self.name)
 
     @functools.cached_property
     def reference_trajectory(self) -> Trajectory | None:
-        """Return the samples of the reference; None where there is none, or its arrays cannot be
-        used."""
+        """Return the samples of the reference.
+
+        It is None if there is none, or its arrays cannot be used.
+        """
         return None if self.reference is None else self.reference.trajectory(self.scene)
 
     @functools.cached_property
     def changes(self) -> list[SceneChange] | None:
-        """Return what differs from this package's scene of its name; None where there is none."""
+        """Return the changes to this package's scene of the same name; None if there is none."""
         known = shipped_scene(self.name)
         return None if known is None else scene_changes(known, self.scene)
 
     @property
     def label(self) -> str:
-        """Return its name, with what was changed in a scene of this package."""
+        """Return its name, with the changes to a scene of this package."""
         return label_with_changes(self.name, self.changes or ())
 
     @property
     def is_shipped(self) -> bool:
-        """Return whether its motion is that of this package's scene of its name; samples and
-        outputs may be others."""
+        """Return whether its motion is that of this package's scene of the same name.
+
+        Samples and outputs may differ.
+        """
         return moves_as_shipped(self.changes)
 
     @property
     def figures(self) -> str:
-        """Return the paper's figures that show its motion, as "11, 13a"; "" where none does."""
+        """Return the paper's figures that show its motion, as "11, 13a"; "" if none does."""
         return str(self.attributes.get("figures", "")) if self.is_shipped else ""
 
     @property
     def title(self) -> str:
+        """Return the title of the scene."""
         return str(self.attributes["title"])
 
     @property
     def reference(self) -> StoredRun | None:
+        """Return the run of the reference, or None."""
         return self.runs.get(REFERENCE)
 
     @property
     def methods(self) -> dict[str, StoredRun]:
-        """Return the runs but the reference, in the order of the file."""
+        """Return all runs except the reference, in the order of the file."""
         return {name: run for name, run in self.runs.items() if name != REFERENCE}
 
     @property
     def printed(self) -> StoredRun | None:
-        """Return the run of the printed equations with all their errata, where it has samples."""
+        """Return the run of the printed equations with all errata, or None without samples."""
         run = self.runs.get(PRINTED)
         return run if run is not None and run.samples else None
 
     @property
     def corrected_runs(self) -> dict[str, StoredRun]:
-        """Return the runs of the corrected models but the reference; those without samples too."""
+        """Return the runs of the corrected models except the reference, also those without samples."""
         return {name: run for name, run in self.methods.items() if is_corrected(name)}
 
     @property
     def corrected(self) -> StoredRun | None:
-        """Return the reference, else the first run of a corrected model that has samples; None
-        without either."""
+        """Return the run that represents the corrected model, or None.
+
+        It is the reference, or the first run of a corrected model that has samples.
+        """
         candidates = [self.reference, *self.corrected_runs.values()]
         return next((run for run in candidates if run is not None and run.samples), None)
 
     @property
     def sides(self) -> dict[str, StoredRun]:
-        """Return the "printed" run and the one that stands for the "corrected" model, those that
-        there are."""
+        """Return the runs "printed" and "corrected", as far as they exist."""
         sides = {"printed": self.printed, "corrected": self.corrected}
         return {side: run for side, run in sides.items() if run is not None}
 
 
 @dataclass(frozen=True)
 class OpenResults:
-    """An open results file: its attributes (versions, platform, created) and its scenes by name, in
-    natural order."""
+    """An open results file.
+
+    Attributes
+    ----------
+    path : of the file.
+    attributes : versions, platform, created.
+    scenes : by name, in natural order.
+    """
 
     path: Path
     attributes: dict[str, Any]
@@ -381,9 +425,23 @@ class OpenResults:
 def open_results(
     path: Path, *, verify: bool = True, only: Collection[str] | None = None
 ) -> Iterator[OpenResults]:
-    """Open a results file; of a file that replaces it meanwhile nothing is seen. A run is compared
-    with its checksum when it is read, but for verify=False; only: names of scenes, by default all.
-    Raises StoreError, also for whatever goes wrong in the block with what the file holds."""
+    """Open a results file for the block; a file that replaces it meanwhile is not seen.
+
+    Parameters
+    ----------
+    path : the file.
+    verify : whether a run is compared with its checksum when it is read.
+    only : names of the scenes, by default all.
+
+    Yields
+    ------
+    OpenResults
+
+    Raises
+    ------
+    StoreError
+        If the file cannot be read, or what it holds causes an error in the block.
+    """
     for _ in range(ATTEMPTS):
         stored = opened_tables(path, None if only is None else {RUNS, *only})
         with path.open("rb") as file:
@@ -400,8 +458,17 @@ def open_results(
 
 
 def run_names(path: Path) -> list[tuple[str, str]]:
-    """Return scene and method of every stored run, in the order of `open_results`. Raises
-    StoreError."""
+    """Return scene and method of every stored run, in the order of `open_results`.
+
+    Parameters
+    ----------
+    path : a results file.
+
+    Raises
+    ------
+    StoreError
+        If it cannot be read.
+    """
     stored = opened_tables(path, {RUNS})
     if RUNS not in stored.tables:
         return []
@@ -417,8 +484,10 @@ def run_names(path: Path) -> list[tuple[str, str]]:
 
 
 def run_arrays(path: Path, group: str = "", scene: str = "") -> dict[str, NDArray[Any]]:
-    """Return the arrays of one run of a results file; group, scene: as for `read_arrays`, the run
-    "scene/method"."""
+    """Return the arrays of one run of a results file, of up to three dimensions.
+
+    `group` and `scene` select the run "scene/method" as in `read_arrays`.
+    """
     with open_results(path) as results:
         runs = {
             f"{name}/{run.method}": run
@@ -430,15 +499,25 @@ def run_arrays(path: Path, group: str = "", scene: str = "") -> dict[str, NDArra
 
 
 def is_sweep(path: Path) -> bool:
-    """Return whether a file of this program is the dataset of a sweep. Raises StoreError where it
-    cannot be read."""
+    """Return whether a file of this program is the dataset of a sweep.
+
+    Raises StoreError if it cannot be read.
+    """
     return read_trailer(path).kind == SWEEP
 
 
 def _scenes(
     stored: TableFile, file: IO[bytes], verify: bool, only: Collection[str] | None
 ) -> Iterator[StoredScene]:
-    """Yield the scenes of an open file with their runs."""
+    """Yield the scenes of an open file with their runs.
+
+    Parameters
+    ----------
+    stored : the tables of the file.
+    file : the file, open for reading.
+    verify : whether a run is compared with its checksum when it is read.
+    only : names of the scenes; None for all.
+    """
     if RUNS not in stored.tables:
         return
     runs = stored.tables[RUNS]
@@ -463,10 +542,15 @@ _MESSAGE_LENGTH = 300
 class Record:
     """A curve of a bench, a ladder of steps, or another group of arrays that belong together.
 
-    kind: a key of `POINT_COLUMNS`, "modes" or "comparison". name: the method, "lagrange/taylor"; of
-    a bench with its fixed choices behind, where they are not the default ones. arrays: (rows,) by
-    name; `status` as codes of `solution.status.STATUSES`. columns: what the arrays are, scales
-    first; of groups of arrays alone.
+    Attributes
+    ----------
+    kind : a key of `POINT_COLUMNS`, "modes" or "comparison".
+    scene : its name.
+    name : the method, "lagrange/taylor"; of a bench followed by its fixed settings if they are not
+        the default ones.
+    attributes : further values by name.
+    arrays : (rows,) by name; `status` as codes of `solution.status.STATUSES`.
+    columns : descriptions of the arrays, scales first; only of groups of arrays.
     """
 
     kind: str
@@ -478,10 +562,12 @@ class Record:
 
     @property
     def method(self) -> str:
+        """Return the name of the method."""
         return str(self.attributes.get("method", self.name))
 
     @property
     def statuses(self) -> list[str]:
+        """Return the name of the status of each row."""
         return [STATUSES[int(code)] for code in self.arrays["status"]]
 
     @property
@@ -496,7 +582,10 @@ class Record:
 
 
 def points_table(group: str, points: Sequence[Mapping[str, object]]) -> TableSpec:
-    """Return the table `group` of these points, each with its known columns by name."""
+    """Return the table of points of a group, "bench" or "stability".
+
+    Each point has its known columns by name, and `run`, its label.
+    """
     runs = [str(point["run"]) for point in points]
     return TableSpec(
         group, runs, known_columns(points), POINT_COLUMNS[group], characters=_MESSAGE_LENGTH
@@ -504,8 +593,10 @@ def points_table(group: str, points: Sequence[Mapping[str, object]]) -> TableSpe
 
 
 def read_records(path: Path, kind: str) -> list[Record]:
-    """Read the records of a kind, in the order of the file; no curve of which a point is missing.
-    Raises StoreError."""
+    """Read the records of a kind, in the order of the file.
+
+    A curve of which a point is missing is left out. Raises StoreError if the file cannot be read.
+    """
     if kind in POINT_COLUMNS:
         tables = TableFile(path, [kind]).tables.values()
         with reading(path):
@@ -515,7 +606,12 @@ def read_records(path: Path, kind: str) -> list[Record]:
 
 
 def _point_records(stored: StoredTable) -> Iterator[Record]:
-    """Yield the rows of a table that belong to one curve or one ladder."""
+    """Yield a record for each curve or ladder of a table whose points are all stored.
+
+    Parameters
+    ----------
+    stored : the table.
+    """
     kind, statuses, rows = stored.group, stored.statuses(), list(stored.known_rows.values())
     columns = stored.place().read(len(stored.runs)) | {
         name: stored.column(name) for name in NUMBERS if name in stored.known
@@ -554,11 +650,21 @@ def _point_records(stored: StoredTable) -> Iterator[Record]:
 
 
 def write_records(path: Path, records: Sequence[Record]) -> None:
-    """Write records, all of one kind, into a file that has those of other scenes still.
+    """Write records of one kind into a file, which keeps those of other scenes.
 
-    The modes of a scene replace all earlier ones of it, a comparison those of the same name. Raises
-    InputError where `path` is a file of another kind, StoreError where it cannot be read or
-    written.
+    The modes of a scene replace all earlier ones of it, a comparison those of the same name.
+
+    Parameters
+    ----------
+    path : the file.
+    records : one or more.
+
+    Raises
+    ------
+    InputError
+        If `path` is a file of another kind.
+    StoreError
+        If it cannot be read or written.
     """
     kind = records[0].kind
     scenes = {record.scene for record in records}

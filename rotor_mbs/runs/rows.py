@@ -1,8 +1,7 @@
-"""Rows of a table as bytes: where they lie in a file, how they are written and read, their
-checksums.
+"""Encode rows of a table as bytes, and write and read them at their offsets in a file.
 
-The bytes of a row are written to their offsets, its status after a sync: a row is stored where its
-status is not -1 and its checksum is right.
+A row has a checksum. Its bytes are written to their offsets, its status after a sync: a row is
+stored if its status is not -1 and its checksum is right.
 """
 
 from __future__ import annotations
@@ -36,11 +35,15 @@ Rows = dict[str, NDArray[Any]]
 
 @dataclass(frozen=True)
 class RowLocation:
-    """Where consecutive rows lie in a file. Worker processes that see the file write them by it.
+    """Location of consecutive rows in a file, by which worker processes write them.
 
-    inode: of the file; another file of that name is not written to. first: number of the first row;
-    its checksum begins with it. offsets: bytes from the beginning of the file to the first row, by
-    column. row_type: its columns are in the order in which the checksum covers them.
+    Attributes
+    ----------
+    path : the file.
+    inode : of the file; another file of that name is not written to.
+    first : number of the first row, with which its checksum begins.
+    offsets : bytes from the beginning of the file to the first row, by column.
+    row_type : its columns are in the order in which the checksum covers them.
     """
 
     path: Path
@@ -50,9 +53,18 @@ class RowLocation:
     row_type: np.dtype[np.void]
 
     def encode(self, values: Mapping[str, object], count: int = 1) -> Rows:
-        """Return rows with these values, the same in each, by the name of their column: numbers, a
-        text, the name of a status, the first samples of an array. The other columns are blank; what
-        is no column here is left out."""
+        """Return rows that all have the same values.
+
+        Parameters
+        ----------
+        values : by name of the column: a number, a text, the name of a status, or the first samples
+            of an array. Other names are ignored; columns without a value are blank.
+        count : number of rows.
+
+        Returns
+        -------
+        dict of ndarray, shape (count, ...)
+        """
         rows = blank_rows(count, self.row_type)
         for name, value in values.items():
             if name == "status":
@@ -69,7 +81,7 @@ class RowLocation:
         return rows
 
     def at(self, row: int) -> RowLocation:
-        """The place of a later row, counted from the first."""
+        """Return the location of a later row, counted from the first."""
         offsets = {
             name: offset + row * self.row_type[name].itemsize
             for name, offset in self.offsets.items()
@@ -77,8 +89,19 @@ class RowLocation:
         return replace(self, first=self.first + row, offsets=offsets)
 
     def write(self, rows: Rows) -> None:
-        """Store consecutive rows, their statuses last; meanwhile they are missing. Raises
-        StoreError."""
+        """Write consecutive rows into the file.
+
+        While they are written their statuses are MISSING; these are written last, after a sync.
+
+        Parameters
+        ----------
+        rows : the columns without the checksum, which is added.
+
+        Raises
+        ------
+        StoreError
+            If the file cannot be written, or has been replaced.
+        """
         columns = rows | {"crc32": checksums(self.first, rows, self.row_type)}
         statuses = {
             name: columns.pop(name)
@@ -101,8 +124,10 @@ class RowLocation:
                 file.write(np.ascontiguousarray(status, np.int8).data)
 
     def read(self, count: int = 1, file: IO[bytes] | None = None) -> Rows:
-        """(count, ...) The columns of so many rows; file: one that is open. Raises OSError,
-        ValueError."""
+        """Read the columns of `count` rows, each (count, ...).
+
+        `file` may be the file that is open already. Raises OSError, ValueError.
+        """
         with nullcontext(file) if file is not None else self.path.open("rb") as source:
             rows = {}
             for name in self.row_type.names or ():
@@ -114,14 +139,13 @@ class RowLocation:
 
     @property
     def is_stored(self) -> bool:
-        """Whether the first row is there as it was written."""
+        """Return whether the first row is stored with a right checksum."""
         row = self.read()
         is_known = 0 <= row["status"][0] < len(STATUSES)
         return bool(is_known and checksums(self.first, row, self.row_type)[0] == row["crc32"][0])
 
     def mark_missing(self, rows: Collection[int]) -> None:
-        """Take back the statuses of some rows, counted from the first, before they are computed
-        again."""
+        """Mark rows as missing, counted from the first, before they are computed again."""
         with store_errors(self.path), self.path.open("r+b") as file:
             for row in rows:
                 for name in ("status", STATUS_COPIES["status"]):
@@ -133,7 +157,7 @@ class RowLocation:
 
 
 def checksums(first: int, rows: Rows, row: np.dtype[np.void]) -> NDArray[np.uint32]:
-    """(rows,) CRC-32 of each row, over its number and its columns."""
+    """Return the CRC-32 of each row over its number and its columns, (rows,) uint32."""
     sums = [first + i & 0xFFFFFFFF for i in range(len(rows["status"]))]
     for name in (name for name in row.names or () if name != "crc32"):
         contents: Any = np.ascontiguousarray(rows[name], row[name].base).reshape(len(sums), -1)
@@ -142,7 +166,7 @@ def checksums(first: int, rows: Rows, row: np.dtype[np.void]) -> NDArray[np.uint
 
 
 def blank_rows(count: int, row: np.dtype[np.void]) -> Rows:
-    """Rows of which nothing is known: NaN, -1, no text."""
+    """Return blank rows: numbers are NaN or -1 (0 if unsigned), texts are empty."""
     blanks = {"f": np.nan, "i": -1, "u": 0, "S": b""}
     kinds = {name: row[name] for name in row.names or ()}
     return {
@@ -152,17 +176,24 @@ def blank_rows(count: int, row: np.dtype[np.void]) -> Rows:
 
 
 def characters(text: str, length: int) -> NDArray[np.bytes_]:
-    """(length,) The text as UTF-8 characters, cut or filled up with zeros."""
+    """Return a text as (length,) UTF-8 bytes, cut or filled up with zeros."""
     return np.frombuffer(text.encode()[:length].ljust(length, b"\0"), CHARACTER)
 
 
 def text_of(values: NDArray[np.bytes_]) -> str:
-    """The text in an array of `characters`."""
+    """Return the text in an array of `characters`."""
     return values.tobytes().rstrip(b"\0").decode(errors="ignore")
 
 
 def row_of_run(run: Solution, place: RowLocation, facts: Mapping[str, object]) -> Rows:
-    """Return the row of a run: status, metrics, times, arrays. facts: further columns by name."""
+    """Return the row of a run: status, metrics, times, arrays.
+
+    Parameters
+    ----------
+    run : the run.
+    place : location of the row, which has its columns.
+    facts : further values by name of the column.
+    """
     integration, run_times_s = run.integration, run.run_times_s or [math.nan]
     # A reference is read back by its angles and rates, whatever the scene asks for.
     own = {"angles": run.angles, "rates": run.rates} if run.method == REFERENCE else {}

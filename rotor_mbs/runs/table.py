@@ -1,4 +1,4 @@
-"""The tables of a file as they lie in it: their columns, and where their rows are.
+"""Read the tables of a file: their columns, and where their rows are.
 
     /runs                 a row per run of the file: scene, method, settings, status, metrics
     /paper/fig11          the arrays of a scene: dimensions run, time, ...
@@ -78,8 +78,19 @@ class StoredTable(TableSpec):
     offsets: Mapping[str, int]
 
     def column(self, name: str) -> NDArray[Any]:
-        """(rows, ...) A column, or a scale, of a table in a file; a computed one as it lies there,
-        read where it is indexed. Raises StoreError where there is none of that name."""
+        """Return a column or a scale of the table, (rows, ...).
+
+        A computed column is a memory map of the file, read where it is indexed.
+
+        Parameters
+        ----------
+        name : of the column; "run" for the labels or numbers of the rows.
+
+        Raises
+        ------
+        StoreError
+            If there is no such column, or the file has been replaced.
+        """
         if name == "run":
             return np.asarray(self.runs)
         if name in self.known:
@@ -96,7 +107,10 @@ class StoredTable(TableSpec):
         return values
 
     def statuses(self) -> NDArray[np.int8]:
-        """(rows,) of those that are there as they were written; MISSING for the others."""
+        """Return the verified status of each row, (rows,) int8.
+
+        It is MISSING for rows that are not stored, or whose checksum is wrong.
+        """
         marked, place = np.array(self.column("status")), self.place()
         statuses = np.full_like(marked, MISSING)
         step = max(_READ_BYTES // place.row_type.itemsize, 1)
@@ -111,8 +125,7 @@ class StoredTable(TableSpec):
         return statuses
 
     def clear(self) -> None:
-        """Write blank rows, which a reader of an unfinished file sees; their statuses stay as they
-        are."""
+        """Write blank rows, which a reader of an unfinished file sees; statuses are not changed."""
         with self.path.open("r+b") as file:
             for name, blank in blank_rows(1, self.row_type).items():
                 if name != "status":
@@ -123,8 +136,11 @@ class StoredTable(TableSpec):
                         file.write(blank.data)
 
     def place(self, row: int = 0) -> RowLocation:
-        """Where the rows from `row` on are. Their checksums begin with the run where that is a
-        number, else the row."""
+        """Return the location of the rows from `row` on.
+
+        Their checksums begin with the number of the run if runs are numbered, otherwise with that
+        of the row.
+        """
         is_numbered = (
             isinstance(self.runs, np.ndarray) and self.runs.dtype.kind == "i" and len(self.runs) > 0
         )
@@ -137,7 +153,19 @@ class StoredTable(TableSpec):
 
 
 def parsed(text: object, kind: type[T], place: object) -> T:
-    """The value of a JSON text, of this type. Raises StoreError: a file may hold anything."""
+    """Return the value of a JSON text.
+
+    Parameters
+    ----------
+    text : the text; a file may hold anything.
+    kind : the type that the value must have.
+    place : the file and the part of it, for the message.
+
+    Raises
+    ------
+    StoreError
+        If the text is no JSON, or the value has another type.
+    """
     try:
         value = json.loads(str(text))
     except (ValueError, RecursionError):
@@ -150,11 +178,14 @@ def parsed(text: object, kind: type[T], place: object) -> T:
 
 
 class TableFile:
-    """The tables of a file, by their groups; rows are read and written by their places.
+    """The tables of a file by their groups; rows are read and written by their location.
 
-    only: groups of the tables that are read, by default all. laid_out_as: attributes and all tables
-    of a file that was just laid out, which is not read. Raises StoreError where the file cannot be
-    read, or what was laid out has changed since.
+    Attributes
+    ----------
+    path : the file.
+    attributes : of the file.
+    groups : names of all its tables.
+    tables : those that have been read, by group.
     """
 
     def __init__(
@@ -164,6 +195,19 @@ class TableFile:
         *,
         laid_out_as: tuple[Mapping[str, Any], Sequence[StoredTable]] | None = None,
     ) -> None:
+        """Read the tables of a file.
+
+        Parameters
+        ----------
+        path : the file.
+        only : groups of the tables that are read, by default all.
+        laid_out_as : attributes and all tables of a file that was just laid out, which is not read.
+
+        Raises
+        ------
+        StoreError
+            If the file cannot be read, or what was laid out has changed since.
+        """
         self.path = path
         self.attributes: dict[str, Any] = {}
         self.groups: list[str] = []
@@ -192,14 +236,13 @@ class TableFile:
             self._check_runs()
 
     def copy(self) -> TableFile:
-        """Return a copy with the same tables, to which others can be added, or from which they can
-        be removed."""
+        """Return a copy with the same tables, in which tables can be added and removed."""
         other = copy.copy(self)
         other.tables = dict(self.tables)
         return other
 
     def _check_runs(self) -> None:
-        """Raises StoreError where a run has no arrays."""
+        """Raise StoreError if a run has no arrays."""
         rows = self.tables[RUNS].known_rows if RUNS in self.tables else {}
         for run, row in rows.items():
             scene, method = row["scene"], row["method_name"]
@@ -210,7 +253,13 @@ class TableFile:
                 raise StoreError(f"{self.path}: {run[:_LONGEST_LABEL]} has no arrays; damaged")
 
     def place(self, run: str, group: str = RUNS) -> RowLocation:
-        """Return where a row is; of a run, together with its arrays."""
+        """Return the location of a row; that of a run includes its arrays.
+
+        Parameters
+        ----------
+        run : label of the row.
+        group : of its table.
+        """
         stored = self.tables[group]
         row = stored.row_of[run]
         place = stored.place(row)
@@ -242,14 +291,19 @@ _SETTLED_NS = 100_000_000  # since the last write, which a clock's tick might hi
 
 
 def opened_tables(path: Path, only: Collection[str] | None = None) -> TableFile:
-    """Return the tables of a file, read once for this process as long as it is the same file.
+    """Return the tables of a file, which are read once in this process until it changes.
 
-    Rows are not kept, but what the layout says: descriptions, and the design of the runs.
+    The layout is kept, that is descriptions and the design of the runs, but no rows.
 
     Parameters
     ----------
     path, only : see `TableFile`; the result may have further tables, which an earlier call asked
         for.
+
+    Raises
+    ------
+    StoreError
+        If the file cannot be read.
     """
     try:
         state = path.stat()
@@ -275,8 +329,19 @@ def opened_tables(path: Path, only: Collection[str] | None = None) -> TableFile:
 
 
 def _table(path: Path, group: str, stored: StoredGroup, inode: int) -> StoredTable:
-    """Return the table of a group. Raises StoreError where it is not what was laid out, or is no
-    table."""
+    """Return the table of a group.
+
+    Parameters
+    ----------
+    path, inode : the file.
+    group : name of the group.
+    stored : what was read of it.
+
+    Raises
+    ------
+    StoreError
+        If it is no table, or differs from what was laid out.
+    """
     known = {name: (stored.columns[name], values) for name, values in stored.values.items()}
     computed = {name: stored.columns[name] for name in stored.rows}
     offsets = {name: rows.offset for name, rows in stored.rows.items()}
@@ -320,10 +385,13 @@ _OF_A_SCENE = (STATUS_COPIES, ("time",), ("title", "scene_toml", "scene_hash"))
 
 
 def _check(table: StoredTable) -> None:
-    """Raise StoreError where a table lacks what every table of its kind has, or a column has
-    another length.
+    """Raise StoreError if a table lacks what its kind always has, or columns are inconsistent.
 
     A digest can be right although another program wrote the file.
+
+    Parameters
+    ----------
+    table : the table.
     """
     place = f"{table.path}: {table.group or 'file'}"
     computed, known, attributes = _ALWAYS.get(table.group, _OF_A_SCENE)
@@ -349,7 +417,7 @@ def _check(table: StoredTable) -> None:
 
 
 def require_texts(attributes: Mapping[str, object], names: Iterable[str], place: object) -> None:
-    """Raises StoreError where one of these attributes is no text."""
+    """Raise StoreError if one of the named attributes is no text."""
     for name in names:
         if not isinstance(attributes.get(name), str):
             raise StoreError(f"{place}: its attribute {name} is no text; damaged")

@@ -1,5 +1,6 @@
-"""The trailer of a file of this program: behind HDF5's end, where the rows lie and a digest of
-every other byte.
+"""Write and check the trailer of a file, which follows the HDF5 content.
+
+It has the locations of the rows, and a digest of every other byte:
 
     HDF5 | JSON | its length, 8 bytes | SHA-256, 32 bytes | MAGIC
 
@@ -8,9 +9,9 @@ offset and length in bytes of its rows, in the order in which the checksum of a 
 digest covers all that stands before it, but for these rows, which have checksums of their own: it
 is right from the layout on, whichever rows are filled.
 
-A flipped bit can hang the HDF5 library, or end the process: whoever opens a file reads the trailer
-first. It is read anew each time, since it is cheap: rows, nearly all of a large file, are not
-hashed.
+A flipped bit can make the HDF5 library hang, or end the process: a file is opened only after its
+trailer was checked. This is done anew each time, since it is cheap: rows, nearly all of a large
+file, are not hashed.
 """
 
 from __future__ import annotations
@@ -52,7 +53,15 @@ Regions = Mapping[str, Mapping[str, tuple[int, int]]]
 
 
 class Trailer(NamedTuple):
-    """What a trailer says, see above; inode: of the file that was checked."""
+    """The content of a trailer, as described above.
+
+    Attributes
+    ----------
+    kind : of the file.
+    groups : locations of the rows.
+    inode : of the file that was checked.
+    digest : SHA-256.
+    """
 
     kind: str
     groups: Regions
@@ -61,7 +70,7 @@ class Trailer(NamedTuple):
 
 
 def trailer_of(file: IO[bytes], kind: str, groups: Regions) -> bytes:
-    """The bytes to be appended to an HDF5 file that is laid out."""
+    """Return the bytes that complete an HDF5 file which is laid out."""
     text = json.dumps(
         {"format_version": FORMAT_VERSION, "kind": kind, "groups": groups}, separators=(",", ":")
     )
@@ -79,8 +88,7 @@ def digest_of(trailer: bytes) -> bytes:
 
 
 def is_of_this_program(path: Path) -> bool:
-    """Return whether a file ends as those that this program writes; it may be damaged all the
-    same."""
+    """Return whether a file ends like those of this program; it may still be damaged."""
     if not path.is_file():
         return False
     with path.open("rb") as file:
@@ -89,10 +97,18 @@ def is_of_this_program(path: Path) -> bool:
 
 
 def read_trailer(path: Path) -> Trailer:
-    """What the trailer of a file says, which is as it was written but for its rows.
+    """Read and check the trailer of a file.
 
-    Raises StoreError where the file cannot be read, is not one of this program and format, or has
-    changed.
+    All of the file but the rows is then known to be as it was written.
+
+    Parameters
+    ----------
+    path : the file.
+
+    Raises
+    ------
+    StoreError
+        If the file cannot be read, is not of this program and format, or has changed.
     """
     if not path.is_file():
         found = "is a folder" if path.is_dir() else "no such file"
@@ -107,6 +123,18 @@ def read_trailer(path: Path) -> Trailer:
 
 
 def _checked(path: Path, file: IO[bytes]) -> Trailer:
+    """Return the trailer of an open file after its digest was compared.
+
+    Parameters
+    ----------
+    path : of the file, for the message.
+    file : open for reading.
+
+    Raises
+    ------
+    StoreError
+        If it has no trailer, has changed, or has another format.
+    """
     size = file.seek(0, 2)
     file.seek(max(size - _TAIL, 0))
     tail = file.read(_TAIL)
@@ -155,11 +183,21 @@ def refuse_split(path: Path, kind: str) -> None:
 
 
 def may_extend(path: Path, kind: str) -> bool:
-    """Decide what a command may write to: whether there is a file of the kind that it extends, and
-    not nothing yet.
+    """Return whether a file of a kind exists that a command can extend.
 
-    An empty file is nothing. Raises InputError where the file holds something else, StoreError
-    where it is damaged, or not this program's.
+    An empty file counts as none.
+
+    Parameters
+    ----------
+    path : the file that the command is to write.
+    kind : of its output.
+
+    Raises
+    ------
+    InputError
+        If the file is of another kind.
+    StoreError
+        If it is damaged, or not of this program.
     """
     if path.is_dir():
         raise StoreError(f"{path}: is a folder; allowed: the name of a file")
@@ -179,8 +217,19 @@ def _words(kind: str) -> str:
 
 
 def _blocks(file: IO[bytes], end: int, groups: Regions) -> Iterator[bytes]:
-    """Yield the bytes before `end` outside the rows. Raises ValueError, TypeError, AttributeError
-    where `groups` are no regions one behind the other."""
+    """Yield the bytes of a file that are outside the rows, in blocks.
+
+    Parameters
+    ----------
+    file : open for reading.
+    end : position in bytes before which the blocks end.
+    groups : locations of the rows.
+
+    Raises
+    ------
+    ValueError, TypeError, AttributeError
+        If `groups` are no regions that follow one another.
+    """
     every = [tuple(region) for columns in groups.values() for region in columns.values()]
     position = 0
     for start, length in [*sorted(region for region in every if region[1]), (end, 0)]:
@@ -197,7 +246,14 @@ def _blocks(file: IO[bytes], end: int, groups: Regions) -> Iterator[bytes]:
 
 
 def _why_without(path: Path, file: IO[bytes], size: int) -> str:
-    """Tell what a file is that does not end with a trailer."""
+    """Describe a file that does not end with a trailer.
+
+    Parameters
+    ----------
+    path : its path; a name like that of an unfinished layout is recognized.
+    file : open for reading.
+    size : in bytes.
+    """
     file.seek(0)
     head = file.read(_HEAD)
     if _OF_A_LAYOUT.fullmatch(path.name):

@@ -1,9 +1,9 @@
-"""Reading of files by the HDF5 library in a worker process with limits of time and memory.
+"""Read files with the HDF5 library in a worker process with limits of time and memory.
 
 A digest is no signature: a forged file can have a right one. The library follows the trees, heaps
 and headers of a file as they are, and some forged ones end the process, or are read without end or
-into endless memory. That happens to the worker then, and this process gets what was read as plain
-values. It reads by itself only what it wrote, or what came with the program.
+into endless memory. Only the worker is then lost; otherwise this process receives what was read as
+plain values. It reads without the worker only what it wrote, or what came with the program.
 """
 
 from __future__ import annotations
@@ -47,13 +47,13 @@ atexit.register(_worker.close)
 
 
 def prepare_reading() -> None:
-    """Start the worker process, which loads its code meanwhile."""
+    """Start the worker process, which loads its code while this one goes on."""
     with suppress(ResourceError):  # told when a file is read
         _worker.start()
 
 
 def trust(digest: bytes) -> None:
-    """Note the digest in the trailer of a file that this process writes."""
+    """Add the digest in the trailer of a file that this process writes to the trusted ones."""
     _trusted.add(digest)
 
 
@@ -61,6 +61,12 @@ def read_in_worker(path: Path, read: Callable[[Path, T], R], argument: T) -> R:
     """Return `read(path, argument)` of a file of this program, called in the worker process.
 
     In a worker process, and for a file that is trusted, it is called in this process.
+
+    Parameters
+    ----------
+    path : the file; the limits of time and memory grow with its size without the rows.
+    read : a function of a path and an argument.
+    argument : its second argument.
 
     Raises
     ------
@@ -101,9 +107,13 @@ def _read_limited(
 ) -> tuple[R | None, bool]:
     """Call `read(path, argument)` within limits of this process.
 
+    Parameters
+    ----------
+    arguments : processor time (s), address space (bytes), `read`, `path` and `argument`.
+
     Returns
     -------
-    value : what was read; None where the memory did not suffice.
+    value : what was read; None if the memory did not suffice.
     is_over_limit : whether the memory did not suffice.
     """
     seconds, memory, read, path, argument = arguments
