@@ -39,12 +39,19 @@ _TOLERANCES = (
 
 @dataclass(frozen=True)
 class MethodFile:
+    """A Python file that defines methods.
+
+    Attributes
+    ----------
+    path : as it is given.
+    text : its content.
+    """
     path: str  # as it is named
     text: str
 
     @property
     def model(self) -> str:
-        """What the names of its methods begin with: "mine" of "folder/mine.py"."""
+        """Return the model in the names of its methods: "mine" for "folder/mine.py"."""
         return Path(self.path).stem
 
     def load(self, built_in: Iterable[Method]) -> dict[str, Method]:
@@ -106,8 +113,14 @@ class MethodFile:
         return f"{self.model}/{method.name.rpartition('/')[2]}"
 
     def _named(self, method: Method) -> Method:
-        """Return a method under the file's name, with a ladder if it has none and a step or a
-        tolerance."""
+        """Return a method with the file's name as model.
+
+        It gets a ladder if it has none but a step or a tolerance.
+
+        Parameters
+        ----------
+        method : as the file defines it.
+        """
         name = self.name_of(method)
         ladders = method.ladders
         if not ladders:
@@ -130,8 +143,11 @@ class MethodFile:
         )
 
     def _items(self, method: Method, scene: Scene) -> list[BuiltItem]:
-        """Where the method does not say what it builds, it is built: what it cannot represent it
-        refuses there. In a process of its own: somebody's code may end or hang it."""
+        """Return the items that a method builds, or refuse what it cannot represent.
+
+        A method that does not list its items is built to see whether it refuses the scene. This is
+        done in another process, as code of others may end or hang it.
+        """
         name = self.name_of(method)
         late = f"{name}: not built for {scene.name} within {_LOAD_S:g} s"
         ended = f"{name}: ended the process that built it for {scene.name}"
@@ -139,7 +155,7 @@ class MethodFile:
         return items
 
     def build_items(self, method: Method, scene: Scene) -> list[BuiltItem]:
-        """As `_items`, in this process."""
+        """Return the items that a method builds, in this process; see `_items`."""
         with self.located():
             if method.items is not no_items:
                 return method.items(scene)
@@ -148,8 +164,10 @@ class MethodFile:
 
     @contextmanager
     def located(self) -> Iterator[None]:
-        """What is raised in the block, but by this package on purpose, is an InputError with file
-        and line number."""
+        """Raise an error of the block as an InputError with file and line number.
+
+        Errors that this package raises on purpose are passed on.
+        """
         try:
             yield
         except RotorError:
@@ -159,7 +177,10 @@ class MethodFile:
 
 
 def located(error: BaseException, paths: Iterable[str]) -> str:
-    """One line of what was raised, with file and line number where that was in one of the files."""
+    """Return an error in one line.
+
+    It has the file and line number if it was raised in one of the files `paths`.
+    """
     paths = list(paths)
     if isinstance(error, SyntaxError) and error.filename in paths:
         return f"{error.filename}:{error.lineno}: {type(error).__name__}: {error.msg}"
@@ -174,7 +195,11 @@ def located(error: BaseException, paths: Iterable[str]) -> str:
 
 
 def read_file(path: str) -> MethodFile:
-    """Read a file and run it in a process of its own.
+    """Read a Python file, and run it in another process.
+
+    Parameters
+    ----------
+    path : of the file.
 
     Raises
     ------
@@ -203,14 +228,14 @@ atexit.register(_worker.close)
 
 
 def _ask(file: MethodFile, built: tuple[str, Scene] | None, late: str, ended: str) -> Any:
-    """Return what a process of its own builds.
+    """Load a file in another process, and return what a method of it builds there.
 
     Parameters
     ----------
     file : the file to load.
     built : a method of it, by the name that the file gives it, and the scene for which it is built;
         None to load alone.
-    late, ended : messages where it takes too long, and where it ends its process.
+    late, ended : messages if it takes too long, and if it ends its process.
 
     Raises
     ------
@@ -239,8 +264,10 @@ _executed: dict[MethodFile, ModuleType] = {}  # in the other process
 
 
 def _answer(question: tuple[MethodFile, tuple[str, Scene] | None]) -> Any:
-    """Run a file, once unless it fails, and build what is asked, in the other process; see
-    `_ask`."""
+    """Run a file, and build the method in the question, in the other process; see `_ask`.
+
+    A file that was run without an error is not run again.
+    """
     file, built = question
     if file not in _executed:
         _executed[file] = file.execute()
@@ -253,7 +280,10 @@ def _answer(question: tuple[MethodFile, tuple[str, Scene] | None]) -> Any:
 
 @contextmanager
 def _without_folder(path: str) -> Iterator[None]:
-    """A file drake.py that says `import drake` means the package, not itself."""
+    """Remove the folder of a file from the import path in the block.
+
+    In a file drake.py, `import drake` then imports the package, not the file itself.
+    """
     before, folder = list(sys.path), Path(path).resolve().parent
     sys.path[:] = [place for place in before if Path(place).resolve() != folder]
     try:
@@ -264,8 +294,10 @@ def _without_folder(path: str) -> Iterator[None]:
 
 @contextmanager
 def quiet() -> Iterator[None]:
-    """Drop what is printed in the block, also what compiled code prints. For one thread at a
-    time."""
+    """Drop everything that is printed in the block, also by compiled code.
+
+    Only one thread at a time may be in such a block.
+    """
     with (
         Path(os.devnull).open("w", encoding="utf-8") as nowhere,
         redirect_stdout(nowhere),

@@ -82,11 +82,16 @@ def recommend(scene: Scene, defaults: tuple[str, ...]) -> tuple[tuple[str, ...],
 
 
 def fastest_rates(scene: Scene) -> tuple[float, float]:
-    """Estimate the fastest swing and the fastest decay in a motion.
+    """Estimate the fastest oscillation and the fastest decay in a motion.
+
+    Parameters
+    ----------
+    scene : the scene.
 
     Returns
     -------
-    swing : rad/s, of the pitches by spring, torque, gravity and a driven rotor, or of the start.
+    swing : rad/s, of the pitches by spring, torque, gravity and a driven rotor, or the initial
+        rate.
     decay : 1/s, of the shaft's and the bearings' dampers.
     """
     swing = abs(scene.initial_rates[0])
@@ -116,7 +121,7 @@ def fastest_rates(scene: Scene) -> tuple[float, float]:
 
 
 def singular_reason(scene: Scene) -> str:
-    """Return why the mass matrix is, or must become, singular; "" where it need not.
+    """Return why the mass matrix of a scene is, or must become, singular; "" if it need not.
 
     Only point-mass blades on a hub without inertia can make it so.
     """

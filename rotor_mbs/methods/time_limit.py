@@ -41,8 +41,10 @@ class OutOfTimeError(Exception):
 
 
 def valid_seconds(timeout: float) -> float:
-    """Return a valid time limit in s; inf: none. Raises InputError unless it is above 0, TypeError
-    for no number."""
+    """Return a valid time limit in s; infinity means none.
+
+    Raises InputError unless it is above 0, TypeError if it is no number.
+    """
     try:
         seconds = math.fsum([timeout])  # as float(timeout), but not of text
     except OverflowError:  # a whole number above 1e308
@@ -53,18 +55,20 @@ def valid_seconds(timeout: float) -> float:
 
 
 def time_limit(seconds: float) -> AbstractContextManager[object]:
-    """Raise OutOfTimeError in the block after `seconds` (inf: never), except inside
-    `samples_kept_at_limit`.
+    """Raise OutOfTimeError in the block after `seconds`; infinity means never.
 
-    Limits may be nested: one that ends while an inner one is active ends the inner block, too.
+    Inside `samples_kept_at_limit` it is not raised. Limits may be nested: one that ends while an
+    inner one is active ends the inner block, too.
     """
     return nullcontext() if seconds > _MAX_LIMIT_S else _Limit(seconds)
 
 
 @contextmanager
 def samples_kept_at_limit() -> Iterator[None]:
-    """Raise nothing in the block at the limit: the code asks `is_over` itself and keeps its
-    samples."""
+    """Raise no OutOfTimeError in the block.
+
+    Its code calls `is_over` itself, and keeps the samples that it has computed.
+    """
     stack = _limits.stack
     if not stack:
         yield
@@ -78,8 +82,10 @@ def samples_kept_at_limit() -> Iterator[None]:
 
 
 def is_over() -> bool:
-    """Return whether a limit is reached; once that is known, a late signal does not interrupt the
-    innermost block."""
+    """Return whether a limit is reached.
+
+    Once this has returned True, a late signal does not interrupt the innermost block.
+    """
     stack = _limits.stack
     if not stack:
         return False
@@ -89,17 +95,19 @@ def is_over() -> bool:
 
 
 def raise_if_over() -> None:
-    """Raise OutOfTimeError where a limit is reached: between parts of long work, for threads
-    without the signal."""
+    """Raise OutOfTimeError if a limit is reached.
+
+    It is called between parts of long work, for threads that the signal does not reach.
+    """
     if is_over():
         raise OutOfTimeError(MESSAGE)
 
 
 def step_callback() -> Callable[[object], bool] | None:
-    """Return what an engine calls after every step, with anything, to know whether to go on.
+    """Return a function for an engine to call after every step, which returns whether to go on.
 
-    None where no alarm can come, neither of a limit nor of the caller: the call takes time, and it
-    is in the call that Python handles signals. For use inside `samples_kept_at_limit`.
+    It is None if no alarm can come, neither of a limit nor of the caller: the call takes time, and
+    Python handles signals in it. For use inside `samples_kept_at_limit`.
     """
     has_alarm = bool(_limits.stack)
     if not has_alarm and _handles_signals() and hasattr(signal, "getitimer"):
@@ -108,8 +116,10 @@ def step_callback() -> Callable[[object], bool] | None:
 
 
 def must_ask() -> bool:
-    """Return whether a limit is active that does not end code by itself: in a thread, or without
-    SIGALRM."""
+    """Return whether a limit is active that cannot interrupt code.
+
+    This is so in a thread, or without SIGALRM.
+    """
     return bool(_limits.stack) and not (_handles_signals() and _signals.has_alarm)
 
 
@@ -121,8 +131,10 @@ def _handles_signals() -> bool:
 
 
 class _Limits(threading.local):
-    """The limits of each thread, the innermost last: that of one thread must not end, or lift, that
-    of another."""
+    """The limits of each thread, the innermost last.
+
+    The limits of one thread do not affect those of another.
+    """
 
     def __init__(self) -> None:
         self.stack: list[_Limit] = []
@@ -299,7 +311,7 @@ class _Signals:
         self.arm()
 
     def arm(self) -> None:
-        """Set the timer to what is due next: the caller's alarm or a limit."""
+        """Set the timer to the next due time: of the caller's alarm or of a limit."""
         if not self._shares_timer:
             return
         now = time.monotonic()
@@ -312,10 +324,13 @@ class _Signals:
         )
 
     def give_timer_back(self, handler: Any = None) -> None:
-        """Set the timer to what is left of the caller's time; an alarm that came due meanwhile
-        comes at once.
+        """Set the timer to what is left of the caller's time.
 
-        handler : in place of ours, before the timer is set.
+        An alarm that came due meanwhile comes at once.
+
+        Parameters
+        ----------
+        handler : replaces ours before the timer is set.
         """
         if not self._shares_timer:
             return
@@ -329,7 +344,14 @@ class _Signals:
             signal.setitimer(signal.ITIMER_REAL, seconds, self._interval)
 
     def on_alarm(self, frame: FrameType | None) -> None:
-        """Raise what is due, unless the code that was interrupted has to finish first."""
+        """Raise OutOfTimeError or call the caller's handler, whichever is due.
+
+        This is delayed if the code that was interrupted must finish first.
+
+        Parameters
+        ----------
+        frame : that was interrupted.
+        """
         if self._is_giving_back:  # the caller's, if it is due, is set to come at once
             return
         if _is_in(frame, None, _is_ours):
@@ -371,8 +393,14 @@ class _Signals:
         self.arm()
 
     def _call_alarm_handler(self, frame: FrameType | None) -> None:
-        """Call the caller's handler of the alarm as if ours were not there: it may set timer and
-        handler."""
+        """Call the caller's handler of the alarm as if ours were not installed.
+
+        It may set the timer and the handler.
+
+        Parameters
+        ----------
+        frame : that was interrupted.
+        """
         handler, shared = self._handlers[_ALARM], self._shares_timer
         if handler == signal.SIG_IGN:
             return
@@ -393,7 +421,7 @@ class _Signals:
                 self.share_timer()
 
     def call_handler(self, number: int, frame: FrameType | None) -> None:
-        """Call the caller's handler of a signal, and note what it raises."""
+        """Call the caller's handler of a signal, and keep what it raises."""
         try:
             self._handlers[number](number, frame)
         except BaseException as error:
@@ -403,8 +431,12 @@ class _Signals:
             raise _passing(error) from None
 
     def on_unraisable(self, unraisable: sys.UnraisableHookArgs) -> None:
-        """Raise an exception of ours again that came where Python ignores it, as in a weak
-        reference's callback."""
+        """Raise an error of ours again that Python ignored, as in a weak reference's callback.
+
+        Parameters
+        ----------
+        unraisable : the arguments of `sys.unraisablehook`; other errors go to the former hook.
+        """
         error = unraisable.exc_value
         if isinstance(error, _HandlerError):
             error = error.error
@@ -420,8 +452,10 @@ class _Signals:
 
 
 def _passing(error: BaseException) -> BaseException:
-    """Return the exception itself, or what carries it where `except Exception` or our own code
-    would catch it."""
+    """Return an exception in a form that `except Exception` and our own code do not catch.
+
+    One that these do not catch anyway is returned unchanged.
+    """
     return _HandlerError(error) if isinstance(error, Exception | SystemExit) else error
 
 

@@ -1,6 +1,6 @@
-"""Tasks on a dask cluster, which needs no shared disk.
+"""Run tasks on a dask cluster, which needs no shared disk.
 
-The only module that knows dask (an extra, and slow to load).
+The only module that imports dask (an extra, and slow to load).
 """
 
 from __future__ import annotations
@@ -73,13 +73,13 @@ def open_cluster(address: str, check: Callable[[], object]) -> Cluster:
 class Cluster(TaskPool):
     """The workers of a dask client.
 
-    A scheduler that is gone, or has no worker for `patience_s`, is a StoreError.
+    A scheduler that is lost, or has no worker for `patience_s`, is a StoreError.
 
     Parameters
     ----------
     client : a dask client; closed with the pool.
     check : called in a worker before each task.
-    patience_s : in s.
+    patience_s : time in s that may pass without a worker.
     """
 
     shares_disk = False
@@ -94,6 +94,7 @@ class Cluster(TaskPool):
         threading.Thread(target=self._watch, daemon=True).start()
 
     def submit(self, work: Callable[[T], R], task: T, timeout_s: float) -> Future[R]:
+        """Return the future of `work(task)`. Raises StoreError if the scheduler is lost."""
         self._refuse_without_scheduler()
         future: Future[R] = self._executor.submit(run_as_worker, work, task, timeout_s, self._check)
         self._waiting.add(future)
@@ -101,12 +102,17 @@ class Cluster(TaskPool):
         return future
 
     def failure(self, error: BaseException) -> str:
+        """Return why a future failed: "worker_died", or "error" of the task itself.
+
+        Raises StoreError if the scheduler is lost.
+        """
         from distributed import KilledWorker
 
         self._refuse_without_scheduler()
         return "worker_died" if isinstance(error, KilledWorker | CancelledError) else "error"
 
     def close(self) -> None:
+        """Close the connection to the cluster."""
         self._client.close()
 
     def _refuse_without_scheduler(self) -> None:
@@ -115,7 +121,10 @@ class Cluster(TaskPool):
             raise StoreError(f"engine dask: {problem}, repeat the command to continue")
 
     def _watch(self) -> None:
-        """End what waits for a cluster whose last worker is gone: it would wait without end."""
+        """Fail all waiting futures if the cluster has no worker for `patience_s`.
+
+        Otherwise they would wait without end.
+        """
         without_since = time.monotonic()
         while time.monotonic() - without_since < self._patience_s:
             time.sleep(min(self._patience_s / 2.0, 1.0))
@@ -134,10 +143,16 @@ class Cluster(TaskPool):
 def run_as_worker(
     work: Callable[[T], R], task: T, timeout_s: float, check: Callable[[], object]
 ) -> R:
-    """Call `work(task)` in a worker of a cluster, which ends where the task takes too long.
+    """Call `work(task)` in a worker of a cluster, which is ended if the task takes too long.
 
     Dask has no time limits; the worker's nanny starts a new one. It is ended by a watchdog outside
     the interpreter, as an engine that hangs may hold the interpreter's lock.
+
+    Parameters
+    ----------
+    work, task : a function and its argument.
+    timeout_s : time limit in s.
+    check : called before; raises an error in a worker that must not be used.
     """
     import faulthandler
 

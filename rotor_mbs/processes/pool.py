@@ -1,4 +1,4 @@
-"""Tasks in parallel worker processes, each task with a time limit."""
+"""Run tasks in parallel worker processes, each task with a time limit."""
 
 from __future__ import annotations
 
@@ -57,9 +57,9 @@ class TaskEnd(Generic[T, R]):
 
 
 class TaskPool(ABC):
-    """What runs tasks: worker processes of this machine (`WorkerPool`), or a cluster.
+    """A context manager that runs tasks.
 
-    A context manager.
+    Its workers are processes of this machine (`WorkerPool`), or of a cluster.
 
     Attributes
     ----------
@@ -72,14 +72,14 @@ class TaskPool(ABC):
 
     @abstractmethod
     def submit(self, work: Callable[[T], R], task: T, timeout_s: float) -> Future[R]:
-        """Return the future of `work(task)`."""
+        """Return the future of `work(task)`; `timeout_s` is its time limit in s."""
 
     def failure(self, error: BaseException) -> str:
         """Return why a future failed: "timed_out", "worker_died", or "error" of the task itself."""
         return error.failure if isinstance(error, TaskLostError) else "error"
 
     def close(self) -> None:  # noqa: B027  (of this process there is nothing to end)
-        """End what runs the tasks."""
+        """End the workers."""
 
     def __enter__(self) -> Self:
         return self
@@ -94,15 +94,17 @@ Workers: TypeAlias = int | TaskPool  # how many processes, or a pool that is ope
 class WorkerPool(TaskPool):
     """Worker processes, each of which keeps its state between tasks.
 
-    Each starts when there is a task for it; where there is an initializer, as many as there are
-    cores start at once. One that dies, or is ended at a time limit, is replaced.
+    Each starts when there is a task for it; with an initializer, as many as there are cores start
+    at once. One that dies, or is ended at a time limit, is replaced.
 
     Parameters
     ----------
     workers : how many processes.
-    initializer : called first in every process; what it raises is the error of a task.
-    core : to which the processes are bound, where the system allows it; None for any.
-    environment : environment variables of the processes where this one has none of the name.
+    initializer : called first in every process; an error that it raises is that of the task.
+    core : number of the core to which the processes are bound, if the system allows it; None for
+        any.
+    environment : default environment variables of the processes; those of this process take
+        precedence.
 
     Examples
     --------
@@ -118,6 +120,12 @@ class WorkerPool(TaskPool):
         core: int | None = None,
         environment: Mapping[str, str] = MappingProxyType({}),
     ) -> None:
+        """Start the first processes if there is an initializer.
+
+        Parameters
+        ----------
+        workers, initializer, core, environment : see the class.
+        """
         self.workers = workers
         self._threads = ThreadPoolExecutor(workers)
         self._workers = [
@@ -161,8 +169,9 @@ class WorkerPool(TaskPool):
 
 
 class SerialPool(TaskPool):
-    """A pool in this process, one task after the other, without time limits: where scripts must not
-    start processes.
+    """A pool that runs tasks in this process, one after the other, without time limits.
+
+    It serves scripts that must not start processes.
 
     >>> SerialPool().submit(abs, -3, timeout_s=10.0).result()
     3
@@ -171,6 +180,7 @@ class SerialPool(TaskPool):
     workers = 1
 
     def submit(self, work: Callable[[T], R], task: T, timeout_s: float) -> Future[R]:  # noqa: ARG002
+        """Call `work(task)` now, and return its finished future; there is no time limit."""
         future: Future[R] = Future()
         try:
             with system_errors_apart():
@@ -183,8 +193,10 @@ class SerialPool(TaskPool):
 
 
 def check_workers(workers: int) -> None:
-    """Raise InputError for a wrong number of worker processes, TypeError for what is no whole
-    number."""
+    """Raise InputError for a number of worker processes that is out of range.
+
+    Raises TypeError if it is no whole number.
+    """
     if not 0 <= operator.index(workers) <= MAX_WORKERS:
         allowed = f"a whole number from 0 to {MAX_WORKERS}"
         raise InputError(f"workers: {shown_value(workers)}; allowed: {allowed}")
@@ -212,7 +224,7 @@ def local_pool(
 
 
 def pool_of(workers: Workers) -> AbstractContextManager[TaskPool]:
-    """A `local_pool` that ends with the block, or one that is given, which does not."""
+    """Return a new `local_pool` that is closed after the block, or a given pool, which is not."""
     return nullcontext(workers) if isinstance(workers, TaskPool) else local_pool(workers)
 
 
@@ -226,7 +238,7 @@ def run_in(
     """Call `work(task)` for all tasks in a pool that is open, and yield how each ended.
 
     A task whose worker died is tried once more at the end, alone. One that can be split is split
-    first, also where it was over its time limit.
+    first, also if it exceeded its time limit.
 
     Parameters
     ----------
@@ -234,13 +246,14 @@ def run_in(
     work : a function of a task.
     tasks : taken as workers become free.
     timeout_s : time limit of a task in s, or a function of the task.
-    split : the parts of a task that stands for many runs; an empty sequence for one that cannot be
-        split.
+    split : returns the parts of a task that consists of many runs; an empty sequence for one that
+        cannot be split.
 
     Raises
     ------
     ResourceError
-        If several tasks in a row find no room on the machine, or no process that starts.
+        If several tasks in a row fail for lack of memory, files or processes, or as code cannot be
+        loaded.
     """
     again: dict[str, list[T]] = {"timed_out": [], "worker_died": []}
     lacks = 0
@@ -283,7 +296,19 @@ def run_in(
 
 
 def _end_of(task: T, future: Future[R], pool: TaskPool) -> TaskEnd[T, R]:
-    """Return how a task ended whose future is done; an error only of the task or of the system."""
+    """Return how a task ended.
+
+    Parameters
+    ----------
+    task : the task.
+    future : its future, which is done.
+    pool : which says how a task failed.
+
+    Returns
+    -------
+    TaskEnd
+        Its `error` is set only for an error of the task itself or of the system.
+    """
     error = CancelledError() if future.cancelled() else future.exception()
     if error is None:
         return TaskEnd(task, future.result())
@@ -301,8 +326,10 @@ def _end_of(task: T, future: Future[R], pool: TaskPool) -> TaskEnd[T, R]:
 
 @contextmanager
 def delayed_interrupts() -> Iterator[None]:
-    """Delay Ctrl-C, SIGTERM and SIGHUP to the end of the block, which ends all processes or
-    none."""
+    """Delay Ctrl-C, SIGTERM and SIGHUP to the end of the block.
+
+    A block that ends processes then ends all of them.
+    """
     if threading.current_thread() is not threading.main_thread():
         yield
         return

@@ -1,4 +1,4 @@
-"""What a worker process does: it answers the requests of its parent, see `processes.worker`."""
+"""Answer the requests of the parent in a worker process, see `processes.worker`."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _is_worker = False
 
 
 def serve() -> None:
-    """Answer requests until the parent ends: the whole of what a worker process does."""
+    """Answer requests until the parent ends; this is all that a worker process does."""
     global _is_worker
     try:
         _is_worker = True
@@ -53,7 +53,10 @@ def _end_with_parent() -> None:
 
 
 def _private_pipes() -> tuple[BinaryIO, BinaryIO]:
-    """Return the pipes of requests and answers, which code that reads or prints does not reach."""
+    """Return the pipes of requests and answers.
+
+    They get new numbers, so that code that reads or prints does not reach them.
+    """
     nothing = os.open(os.devnull, os.O_RDWR)
     while nothing <= 2:  # the parent's standard error may have been closed
         nothing = os.open(os.devnull, os.O_RDWR)
@@ -64,8 +67,10 @@ def _private_pipes() -> tuple[BinaryIO, BinaryIO]:
     requests, answers = os.fdopen(pipes[0], "rb"), os.fdopen(pipes[1], "wb")
 
     def close_in_fork() -> None:
-        """Close the pipes in what a method forks, which may outlive this process, and hide its
-        end."""
+        """Close the pipes in a process that a method forks.
+
+        It may outlive this process, and open pipes would hide the end of this one.
+        """
         while pipes:
             os.close(pipes.pop())
 
@@ -75,7 +80,7 @@ def _private_pipes() -> tuple[BinaryIO, BinaryIO]:
 
 
 def _receive(requests: BinaryIO, received: queue.SimpleQueue[bytes]) -> None:
-    """Pass requests on; end this process where they end."""
+    """Pass requests on to the main thread; end this process when they end."""
     try:
         while True:
             received.put(pickle.load(requests))
@@ -107,9 +112,14 @@ def _keep_below_limit_of_parent() -> None:
 
 
 def limit_resources(memory: int, processor_s: int | None = None) -> None:
-    """Limit address space (bytes) and processor time (s) of this process, where the system can.
+    """Limit address space and processor time of this process, if the system can.
 
-    Over the second limit the system ends it.
+    The system ends a process that exceeds the processor time.
+
+    Parameters
+    ----------
+    memory : address space, bytes.
+    processor_s : processor time, s; None for no limit.
     """
     with suppress(ImportError):  # Windows
         import resource
@@ -126,8 +136,10 @@ def limit_resources(memory: int, processor_s: int | None = None) -> None:
 
 
 def address_space() -> float:
-    """Return the limit of address space (bytes) of this process and of those that it starts;
-    infinite without one."""
+    """Return the limit of address space (bytes) of this process; infinite without one.
+
+    It holds for the processes that it starts, too.
+    """
     with suppress(ImportError):  # Windows
         import resource
 
@@ -143,10 +155,13 @@ def is_worker() -> bool:
 
 
 def _answer(request: bytes) -> bytes:
-    """Return the pickled (result, error) of a request: a folder, and a pickled function with its
-    argument.
+    """Return the pickled (result, error) of a request.
 
-    What cannot be pickled, and an exit, is an error of the task.
+    A result or error that cannot be pickled, and an exit, become an error of the task.
+
+    Parameters
+    ----------
+    request : pickled: a folder, and a pickled function with its argument.
     """
     try:
         with system_errors_apart():

@@ -1,4 +1,4 @@
-"""A worker process: it calls functions for its parent, and can be ended at any time.
+"""Call functions in a worker process, which can be ended at any time.
 
 It is a plain Python process with the import path of its parent. Functions, arguments and results
 pass through two pipes as pickles, so that it does not need the script that its parent runs.
@@ -70,11 +70,12 @@ class Worker:
 
     Parameters
     ----------
-    initializer : called first in every process; what it raises is the error of the next task.
-    core : to which the process is bound, where the system allows it; None for any.
-    memory_limit : bytes of address space, where the system can limit it; None for no limit.
+    initializer : called first in every process; an error that it raises is that of the next task.
+    core : number of the core to which the process is bound, if the system allows it; None for any.
+    memory_limit : bytes of address space, if the system can limit it; None for no limit.
     is_silent : whether what the process prints is dropped; otherwise it goes to standard error.
-    environment : environment variables of the process where this process has none of the name.
+    environment : default environment variables of the process; those of this process take
+        precedence.
     set_up_limit_s : time for the start of the process, its imports and its initializer, in s.
 
     Examples
@@ -94,6 +95,12 @@ class Worker:
         environment: Mapping[str, str] = MappingProxyType({}),
         set_up_limit_s: float = SET_UP_LIMIT_S,
     ) -> None:
+        """Note how the process is to be started; none is started yet.
+
+        Parameters
+        ----------
+        initializer, core, memory_limit, is_silent, environment, set_up_limit_s : see the class.
+        """
         self._set_up = partial(set_up, core, memory_limit)
         self._initializer = initializer
         self._default_environment = _ONE_THREAD | dict(environment)
@@ -108,12 +115,12 @@ class Worker:
         _workers.add(self)
 
     def start(self) -> _Process:
-        """Start the process unless it works; it loads its code while the caller goes on.
+        """Start the process unless it is running; it loads its code while the caller continues.
 
         Raises
         ------
         ResourceError
-            If the system has no room for it, after a moment in which there may be some again.
+            If the system cannot start a process, after a pause, or this worker is closed.
         """
         with self._lock:
             if self._process is not None and self._process.poll() is not None:
@@ -128,7 +135,10 @@ class Worker:
     def run(self, work: Callable[[T], R], task: T, timeout_s: float) -> R:
         """Call `work(task)` in the process, in the current folder of this one.
 
-        The time limit counts from when the process, with its initializer done, begins.
+        Parameters
+        ----------
+        work, task : a function and its argument, which can be pickled.
+        timeout_s : time limit in s, from when the process, with its initializer done, begins.
 
         Raises
         ------
@@ -159,14 +169,13 @@ class Worker:
         return result
 
     def end_process(self) -> None:
-        """End the process at once, with what it does and its state; the next call starts
-        another."""
+        """End the process at once, with its task and its state; the next call starts another."""
         with self._lock:
             if self._process is not None:
                 self._process.end()
 
     def close(self) -> None:
-        """End the process at once, with what it does, and start no other; from any thread."""
+        """End the process at once with its task, and start no other; may be called from any thread."""
         self._is_closed = True
         self.end_process()
 
@@ -177,7 +186,7 @@ class Worker:
         self.close()
 
     def _started(self) -> _Process:
-        """Start a process and ask it to set itself up. Raises ResourceError."""
+        """Start a process and send it the request to set itself up. Raises ResourceError."""
         from concurrent.futures import wait  # late: `rotor-mbs list` starts no process
 
         beginning: Future[_Process] | None = None
@@ -215,8 +224,10 @@ class Worker:
         )
 
     def _wait_until_set_up(self, process: _Process) -> None:
-        """Wait for the initializer. Raises ResourceError if the process ends or is late, and what
-        it raises."""
+        """Wait until the initializer has returned, and raise what it raises.
+
+        Raises ResourceError if the process ends or takes too long.
+        """
         try:
             answer = process.exchange(b"", self._set_up_limit_s)
         except TaskLostError as exc:
@@ -228,8 +239,10 @@ class Worker:
         process.is_set_up = True
 
     def _forget_after_fork(self) -> None:
-        """Leave the process to the parent, in a child that was forked off it with locks as they
-        were."""
+        """Leave the process to the parent, in a child that was forked off it.
+
+        The child gets new locks, as the old ones may have been held by other threads of the parent.
+        """
         self._turn, self._lock = threading.Lock(), threading.Lock()
         if self._process is not None:
             self._process.forget()
@@ -262,8 +275,10 @@ class _Process(subprocess.Popen[bytes]):
     is_set_up = False
 
     def send(self, message: bytes) -> None:
-        """Send a message; where the process has died, its answer shows that. Raises what is raised
-        meanwhile."""
+        """Send a message; if the process has died, the next answer shows that.
+
+        Raises an error that is raised meanwhile in this process.
+        """
         try:
             send(self.stdin, message)
         except Exception as exc:
@@ -271,14 +286,19 @@ class _Process(subprocess.Popen[bytes]):
                 raise
 
     def exchange(self, request: bytes, timeout_s: float) -> bytes:
-        """Send a request, unless it is empty, and return the next answer.
+        """Send a request, and return the next answer.
+
+        Parameters
+        ----------
+        request : a pickled message; an empty one is not sent.
+        timeout_s : time limit of the answer in s, after which the process is ended.
 
         Raises
         ------
         TaskLostError
-            If the process is late, and then ended, or has died.
+            If the process exceeded the limit or has died.
         ResourceError
-            If the system has no room for the thread that watches the time.
+            If the system cannot start the thread that watches the time.
         Exception
             What is raised in this process while it waits.
         """
@@ -304,7 +324,7 @@ class _Process(subprocess.Popen[bytes]):
         return answer
 
     def _ends(self, error: Exception) -> bool:
-        """Return whether the process has ended, within a moment after an error of its pipes."""
+        """Return whether the process has ended, or ends soon after an error of its pipes."""
         try:
             self.wait(_END_S if isinstance(error, _PIPE_ERRORS) else 0.0)
         except subprocess.TimeoutExpired:
@@ -313,8 +333,17 @@ class _Process(subprocess.Popen[bytes]):
 
     @contextmanager
     def _killed_after(self, limit_s: float) -> Iterator[threading.Event]:
-        """Kill the process if the block takes longer; yield the event that is set then. Raises
-        ResourceError."""
+        """Kill the process if the block takes too long; yield the event that is set then.
+
+        Parameters
+        ----------
+        limit_s : time limit in s.
+
+        Raises
+        ------
+        ResourceError
+            If the thread that watches the time cannot be started.
+        """
         is_late = threading.Event()
 
         def end_late() -> None:
@@ -333,8 +362,10 @@ class _Process(subprocess.Popen[bytes]):
             timer.join()
 
     def end(self, patience_s: float = 0.0) -> int:
-        """End the process, where it has not ended by itself within `patience_s`; return its exit
-        code."""
+        """End the process and return its exit code.
+
+        It is killed if it has not ended by itself within `patience_s`.
+        """
         try:
             code = self.wait(patience_s)
         except subprocess.TimeoutExpired:
@@ -346,8 +377,10 @@ class _Process(subprocess.Popen[bytes]):
         return code
 
     def forget(self) -> None:
-        """Close the pipes in a child of the parent, without what the parent was sending, and wait
-        for nothing."""
+        """Close the pipes in a forked child of the parent, and wait for nothing.
+
+        What the parent was sending is dropped.
+        """
         self.returncode = 0  # it is no child of this process
         for stream in (self.stdin, self.stdout):
             # The buffer's own lock may be held by a thread that there is not in this process.
@@ -355,14 +388,16 @@ class _Process(subprocess.Popen[bytes]):
 
 
 def _end_begun(beginning: Future[_Process]) -> None:
-    """End a process that has begun after all."""
+    """End a process that was started when nobody waited for it any more."""
     if not beginning.cancelled() and beginning.exception() is None:
         beginning.result().end()
 
 
 def _not_started(reason: str) -> ResourceError:
-    """Return the error of a process that could not be started, with the limit of memory under which
-    that was."""
+    """Return the error of a process that could not be started.
+
+    It has the reason, and the memory limit of this process if there is one.
+    """
     return ResourceError(f"a process could not be started: {reason}{memory_limit_text()}")
 
 

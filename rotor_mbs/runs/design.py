@@ -182,7 +182,7 @@ class RunRequest:
     Attributes
     ----------
     scene : the scene.
-    method, settings : name of the method, and its settings that are not the default ones.
+    method, settings : name of the method, and the settings that are given for it.
     versions : of what computes it, by default those of this installation; of a reference that is
         read from a shipped file also who computed it (`frozen_with`).
     """

@@ -386,7 +386,7 @@ class StoredScene:
 
     @property
     def corrected_runs(self) -> dict[str, StoredRun]:
-        """Return the runs of the corrected models except the reference, also those without samples."""
+        """Return the runs of the corrected models except the reference, also without samples."""
         return {name: run for name, run in self.methods.items() if is_corrected(name)}
 
     @property

@@ -73,7 +73,17 @@ def evaluate(text: str) -> float:
 
 
 def _value(node: ast.expr) -> float:
-    """Return the value of a part of an expression. Raises ValueError for what is not arithmetic."""
+    """Return the value of a part of an expression.
+
+    Parameters
+    ----------
+    node : the part as a syntax tree.
+
+    Raises
+    ------
+    ValueError
+        If it is not arithmetic, or has no finite value.
+    """
     match node:
         case ast.Constant(value=int() | float() as number) if not isinstance(number, bool):
             return _applied(as_text(ast.unparse(node)), float, number)

@@ -145,7 +145,17 @@ def counted(count: int, noun: str, plural: str = "") -> str:
 
 
 def read_number(value: object) -> float:
-    """Return a finite float, from a number or from arithmetic in quotes. Raises TableError."""
+    """Return a finite float, from a number or from arithmetic in quotes.
+
+    Parameters
+    ----------
+    value : as a file has it.
+
+    Raises
+    ------
+    TableError
+        If it is no number, or out of range.
+    """
     result = value
     if isinstance(value, str):
         try:
@@ -356,7 +366,18 @@ def _read_entries(
     read: Callable[[Any], Any],
     entries: Iterable[tuple[str | int, Any]],
 ) -> dict[Any, Any]:
-    """Return every value of a list or table by its place. Raises TableError with all problems."""
+    """Return every value of a list or table by its place.
+
+    Parameters
+    ----------
+    read : reads one value.
+    entries : place and value of each.
+
+    Raises
+    ------
+    TableError
+        With the problems of all values.
+    """
     results: dict[Any, Any] = {}
     problems: list[KeyProblem] = []
     for place, value in entries:

@@ -229,8 +229,22 @@ def _bearing(
 ) -> tuple[tuple[float, float, float], ...]:
     """Return stiffness, damping and neutral pitch (degrees) of each pitch bearing.
 
-    They exist since OpenFAST 5, where ServoDyn has them; () for a prescribed pitch. Raises
-    InputError for a pitch that is free and has no inertia.
+    OpenFAST has them in ServoDyn since version 5.
+
+    Parameters
+    ----------
+    main, structure : the .fst file and ElastoDyn's primary file.
+    blades : of the rotor.
+
+    Returns
+    -------
+    tuple of (float, float, float)
+        In N m/rad, N m s/rad and degrees; () for a prescribed pitch.
+
+    Raises
+    ------
+    InputError
+        For a pitch that is free and has no inertia.
     """
     if not structure.flag("PitchDOF"):
         return ()
@@ -372,7 +386,18 @@ def _nodes(
 def _aerodyn14_nodes(
     structure: InputFile, aero: InputFile, length: float
 ) -> tuple[list[float], list[float], str]:
-    """Return distances from the root and widths of AeroDyn 14's nodes, m, and what they are."""
+    """Return distances from the root and widths (m) of AeroDyn 14's nodes, and a description.
+
+    Parameters
+    ----------
+    structure, aero : the input files of ElastoDyn and AeroDyn 14.
+    length : of the blade, m.
+
+    Raises
+    ------
+    InputError
+        If the nodes are not in the middle of elements between HubRad and TipRad.
+    """
     count = aero.whole("BldNodes", 1, MAX_NODES)
     header = aero.line_with("RNodes", "DRNodes")
     (at_radius,) = table_columns(aero, header, ("RNodes",))
@@ -521,7 +546,24 @@ def _reference_axis(file: InputFile) -> tuple[NDArray[np.float64], NDArray[np.fl
 
 
 def _stations(file: InputFile) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return fractions of the axis's length, (n,), and mass matrices, (n, 6, 6), of stations."""
+    """Return the stations of a blade of BeamDyn.
+
+    Parameters
+    ----------
+    file : the blade file.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Fractions of the length of the axis.
+    ndarray, shape (n, 6, 6)
+        Mass matrices.
+
+    Raises
+    ------
+    InputError
+        If the table is missing or incomplete, fractions do not rise, or a mass is negative.
+    """
     import numpy as np  # late, as above
 
     count = file.whole("station_total", 2, MAX_ROWS)

@@ -111,7 +111,13 @@ def _left_out_comments(rotor: OpenFastRotor) -> list[str]:
 
 
 def _blade_lines(blade: BladeModel, rotor: OpenFastRotor) -> list[str]:
-    """Return the entries of the table of a blade, with comments on where they come from."""
+    """Return the entries of the table of a blade, with comments on their sources.
+
+    Parameters
+    ----------
+    blade : the blade.
+    rotor : its rotor, for the hub radius.
+    """
     x, y, z = blade.centre_of_mass
     tip_x, tip_y, tip_z = blade.tip
     on_axis = not x and not y
@@ -145,7 +151,12 @@ def _blade_lines(blade: BladeModel, rotor: OpenFastRotor) -> list[str]:
 
 
 def _hub_and_start_lines(rotor: OpenFastRotor) -> list[str]:
-    """Return the tables of the hub, the start and the torque."""
+    """Return the lines of the tables of the hub, the initial state and the torque.
+
+    Parameters
+    ----------
+    rotor : as it was read from the OpenFAST model.
+    """
     azimuth = rotor.azimuth - rotor.azimuth_up
     angles = [_angle(azimuth), *(_angle(-blade.pitch) for blade in rotor.blades)]
     rates = [
@@ -170,7 +181,13 @@ def _hub_and_start_lines(rotor: OpenFastRotor) -> list[str]:
 
 
 def _bearing_lines(rotor: OpenFastRotor) -> list[str]:
-    """Return the table of the pitch bearings; without one where no pitch can move."""
+    """Return the lines of the table of the pitch bearings; none if no pitch can move.
+
+    Parameters
+    ----------
+    rotor : as it was read from the OpenFAST model. If it prescribes the pitch, a spring and damper
+        are assumed.
+    """
     rests = [-blade.pitch for blade in rotor.blades]
     if rotor.bearing:
         stiffness = [_number(bearing[0]) for bearing in rotor.bearing]

@@ -135,7 +135,19 @@ def is_rigid_body_inertia(inertia: Sequence[float]) -> bool:
 
 
 def _read_load(value: object) -> LoadTable:
-    """Return a table over time from its rows or a constant; () where it is zero at all times."""
+    """Return a table over time, (time, value) in each row, from its rows or a constant.
+
+    It is () if it is zero at all times.
+
+    Parameters
+    ----------
+    value : as a file has it.
+
+    Raises
+    ------
+    TableError
+        If a time is below 0 or before the last one, or three rows have the same time.
+    """
     if not isinstance(value, list):
         constant = keys.SIZE.read(value)
         return ((0.0, constant),) if constant else ()
@@ -1089,7 +1101,14 @@ def put_value(tables: dict[str, Any], path: KeyPath, value: object) -> None:
 
 
 def _no_such_entry(container: Any, path: KeyPath, depth: int) -> KeyProblem:
-    """Return the problem that what stands at `path[:depth]` has no entry `path[depth]`."""
+    """Return the problem of a key path with an entry that does not exist.
+
+    Parameters
+    ----------
+    container : the value at `path[:depth]`, which has no entry `path[depth]`.
+    path : of the key.
+    depth : number of parts of the path that exist.
+    """
     above, part = path[:depth], path[depth]
     if isinstance(container, list) and isinstance(part, int):
         name = shown_key(above)
@@ -1290,7 +1309,12 @@ def _as_wide_angle(angle: float) -> str:
 
 
 def _implausible_motion(scene: Scene) -> list[str]:
-    """Return a line for each angle and rate that seems to be in degrees."""
+    """Return a line for each initial angle, initial rate and rest angle that seems to be in degrees.
+
+    Parameters
+    ----------
+    scene : the scene, with angles in rad and rates in rad/s.
+    """
     lines = []
     # Where one is more than a turn, other whole numbers are in degrees, too.
     in_degrees = any(abs(angle) > TURN for angle in scene.initial_angles)

@@ -626,10 +626,14 @@ def _sweep(
 
 
 def _rows_to_check(sweep: Sweep) -> Iterator[tuple[int, Variants, tuple[float, ...]]]:
-    """Yield the rows that are to be read to be sure that all can be.
+    """Yield rows of a sweep which show, if they can be read, that all rows can.
 
-    These are the ends of each axis, and all rows where numbers depend on one another, which
-    inertias and torque tables alone do.
+    These are the ends of each axis, and all rows in which numbers depend on one another. Only
+    inertias and torque tables do.
+
+    Parameters
+    ----------
+    sweep : the sweep.
 
     Yields
     ------

@@ -195,7 +195,17 @@ _TOML_ALLOWED = 'allowed: TOML 1.0, with arithmetic in quotes: "pi/6"'
 
 
 def read_toml(path: Path) -> TomlFile:
-    """Read a TOML file with a limit on its size. Raises InputError with one line."""
+    """Read a TOML file with a limit on its size.
+
+    Parameters
+    ----------
+    path : of the file.
+
+    Raises
+    ------
+    InputError
+        With one line: it cannot be read, is too large or empty, or is no TOML text in UTF-8.
+    """
     shown = shown_path(path)
     try:
         if path.exists() and not path.is_file():  # a pipe or a device would block, or never end
@@ -370,6 +380,10 @@ def _statements(text: str) -> Iterator[list[tuple[str, int]]]:
     """Yield the tokens of each table header and each `key = value`, with their line numbers.
 
     Newlines inside brackets are left out.
+
+    Parameters
+    ----------
+    text : the content of a TOML file.
     """
     statement: list[tuple[str, int]] = []
     line, depth = 1, 0
