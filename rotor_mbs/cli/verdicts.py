@@ -192,6 +192,10 @@ def _refuse_foreign(arguments: argparse.Namespace) -> None:
     """Raise InputError if --junit or --json is a file of another kind, or both are the same.
 
     This is checked before anything is computed.
+
+    Parameters
+    ----------
+    arguments : `junit` and `json`, paths or None.
     """
     if (
         arguments.junit is not None

@@ -46,6 +46,7 @@ class MethodFile:
     path : as it is given.
     text : its content.
     """
+
     path: str  # as it is named
     text: str
 

@@ -175,7 +175,10 @@ class Worker:
                 self._process.end()
 
     def close(self) -> None:
-        """End the process at once with its task, and start no other; may be called from any thread."""
+        """End the process at once with its task, and start no other.
+
+        It may be called from any thread.
+        """
         self._is_closed = True
         self.end_process()
 

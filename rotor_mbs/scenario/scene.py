@@ -1309,7 +1309,7 @@ def _as_wide_angle(angle: float) -> str:
 
 
 def _implausible_motion(scene: Scene) -> list[str]:
-    """Return a line for each initial angle, initial rate and rest angle that seems to be in degrees.
+    """Return a line for each angle, rate and rest angle that seems to be in degrees.
 
     Parameters
     ----------
