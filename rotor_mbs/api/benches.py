@@ -1,4 +1,4 @@
-"""Error against run time in Python: `rm.bench`, and what it returns."""
+"""Measure error against run time in Python: `rm.bench`, and what it returns."""
 
 from __future__ import annotations
 

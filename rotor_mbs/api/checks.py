@@ -1,4 +1,4 @@
-"""Accuracy checks in Python: `rm.check`, `rm.test_method`, and what they return."""
+"""Check accuracy in Python: `rm.check`, `rm.test_method`, and what they return."""
 
 from __future__ import annotations
 
@@ -124,7 +124,7 @@ def check(
 
 
 def test_method(name: str | os.PathLike[str], *, timeout: float = 60.0) -> Checks:  # noqa: PT028  (no test)
-    """Examine a method: order, symmetry, energies, loads, refusals, and why something is wrong.
+    """Test a method: order, symmetry, energies, loads and refusals, with the causes of faults.
 
     Parameters
     ----------
@@ -137,6 +137,12 @@ def test_method(name: str | os.PathLike[str], *, timeout: float = 60.0) -> Check
         For an unknown method, or a file that has none.
     TypeError
         For an argument of a wrong type.
+
+    Examples
+    --------
+    >>> import rotor_mbs as rm
+    >>> rm.test_method("lagrange/dop853").passed                         # doctest: +SKIP
+    True
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Data of another program against a scene: `rm.compare`, and what it returns."""
+"""Compare data of another program with a scene: `rm.compare`, and what it returns."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Natural frequencies, damping and mode shapes: `rm.modes`, and what it returns."""
+"""Compute natural frequencies, damping and mode shapes: `rm.modes`, and what it returns."""
 
 from __future__ import annotations
 

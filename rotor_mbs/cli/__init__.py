@@ -89,6 +89,8 @@ def _run(words: list[str]) -> int:
             with _signals_as_interrupts(), warnings.catch_warnings(), system_errors_apart():
                 warnings.simplefilter("always", PlausibilityWarning)
                 warnings.showwarning = _print_warning
+                # Loaded here: an interrupt, or a lack of memory, while code is loaded ends the command
+                # in the same way as later.
                 from rotor_mbs.cli.arguments import load_methods, parse
 
                 arguments = parse(words)
@@ -97,6 +99,7 @@ def _run(words: list[str]) -> int:
                 module, _, function = arguments.command.partition(":")
                 command = getattr(importlib.import_module(f"rotor_mbs.cli.{module}"), function)
                 status = int(command(arguments))
+            # What is still in the buffer may fail, too.
             sys.stdout.flush()
             if isinstance(sys.stdout, PlainStream) and sys.stdout.failure is not None:
                 raise sys.stdout.failure

@@ -108,6 +108,7 @@ def new(arguments: argparse.Namespace) -> int:
         raise InputError(f"{source}: is neither a scene nor an OpenFAST model; allowed: {allowed}")
     else:
         texts = {path: only_scene(arguments.source).text}
+    # All names are checked before the first file is written.
     for new_file in texts:
         if new_file.exists() or new_file.is_symlink():
             raise InputError(
@@ -244,6 +245,7 @@ def _show_scene(arguments: argparse.Namespace) -> None:
         model = models.setdefault(method.model, facts)
         model["methods"].append(method.name)
         model["is_linearized"] |= method.linearize is not None
+        # The methods of a model build the same items: those of the first that has any are shown.
         if not model["items"]:
             try:
                 model["items"], model["refused"] = list(map(asdict, method.items(scene))), ""

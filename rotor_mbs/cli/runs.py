@@ -91,6 +91,7 @@ def reproduce(arguments: argparse.Namespace) -> int:
     else:
         status, text = _reproduce(arguments, results, pages)
         replace_file(summary, text.encode(), rb"\A\s*(result|method) ")
+        # Written last, and only after success: otherwise the next call computes what is missing.
         if status == 0:
             replace_file(
                 stamp, made_from(results, arguments.timeout).encode(), rb"\A[0-9a-f]{64}\Z"

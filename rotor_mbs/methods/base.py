@@ -1,4 +1,4 @@
-"""What a method is: one object that says all there is to know of it, with ladders of settings."""
+"""Define a method: one object with everything the package knows of it, and ladders of settings."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Ladder:
 
     @property
     def coarse(self) -> Ladder:
-        """This ladder with every second value, without the coarsest third."""
+        """Return this ladder with every second value, without the coarsest third."""
         return replace(self, values=self.values[len(self.values) // 3 :: 2])
 
     def settings_by_value(self, interval: float) -> dict[float, dict[str, object]]:
@@ -195,22 +195,22 @@ class Method:
 
     @property
     def model(self) -> str:
-        """Name of the model, such as "lagrange" for "lagrange/taylor"."""
+        """Return the name of the model, such as "lagrange" for "lagrange/taylor"."""
         return self.name.partition("/")[0]
 
     @property
     def model_label(self) -> str:
-        """Label of the model, such as "closed form" for "closed form, Taylor"."""
+        """Return the label of the model, such as "closed form" for "closed form, Taylor"."""
         return self.label.partition(",")[0]
 
     @property
     def defaults(self) -> dict[str, object]:
-        """Values of its settings where none are given."""
+        """Return the default values of its settings."""
         return self.settings().as_dict()
 
     @property
     def is_installed(self) -> bool:
-        """Whether all packages that it needs are installed."""
+        """Return whether all packages that it needs are installed."""
         return all(_is_distribution_installed(distribution) for distribution in self.distributions)
 
     def chosen(self, scene: Scene, given: Mapping[str, object]) -> Settings:

@@ -1,4 +1,4 @@
-"""All methods by name: built-in ones, those of installed packages, those of files that were named.
+"""Find methods by name: built-in ones, those of installed packages, those of named files.
 
 Packages add methods by entry points. A model's code is imported when one of its methods is first
 used; its engine, when a solver is built. Which methods run a scene, with which settings, is decided

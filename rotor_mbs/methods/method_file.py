@@ -1,4 +1,4 @@
-"""Methods that a Python file defines, named by its path: `-m ./mine.py` has `mine/...`.
+"""Load methods that a Python file defines, named by its path: `-m ./mine.py` has `mine/...`.
 
 The file's text is read once and goes with every task to its worker process, which needs no file and
 computes what this process has read.

@@ -1,4 +1,4 @@
-"""The rule that selects methods for a scene where none is named.
+"""Select methods for a scene by a rule if none is named.
 
 The rule is drawn from the stability suite: which methods fail, or take minutes, on which scenes.
 """

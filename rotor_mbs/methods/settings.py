@@ -1,4 +1,4 @@
-"""Settings of a method: unit, default and allowed values, declared once, checked on every use.
+"""Declare the settings of a method once, with unit, default and allowed values, and check them.
 
 What a value may be is a `Kind` of `scenario.keys`, as for the keys of a scene file.
 """

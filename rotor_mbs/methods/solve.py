@@ -1,4 +1,4 @@
-"""A run of one method on one scene: the solver is built, timed and asked for its samples."""
+"""Run one method on one scene: build its solver, time it, and take the samples."""
 
 from __future__ import annotations
 

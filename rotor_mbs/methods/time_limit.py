@@ -1,4 +1,4 @@
-"""Time limits of runs, and the signal handlers of the caller while methods run.
+"""Limit the time of runs, and keep the signal handlers of the caller while methods run.
 
 A limit ends a block by OutOfTimeError, or, inside `samples_kept_at_limit`, lets the code ask
 `is_over` between steps, where an exception would lose samples. In the main thread the exception
@@ -190,8 +190,10 @@ _limits = _Limits()
 
 
 class _HandlerError(BaseException):
-    """Carries an exception of a caller's handler past every `except Exception`, to the end of
-    `caller_signals`."""
+    """Exception that carries one of a caller's handler past every `except Exception`.
+
+    The exception that it carries is raised at the end of `caller_signals`.
+    """
 
     def __init__(self, error: BaseException) -> None:
         super().__init__(error)
@@ -218,8 +220,10 @@ class caller_signals(ContextDecorator):  # noqa: N801  (a context manager, as `c
 
 
 class _Signals:
-    """The handlers and the timer of the caller, while ours stand in their place; used by the main
-    thread alone."""
+    """The signal handlers and the timer of the caller, while ours replace them.
+
+    Only the main thread uses it.
+    """
 
     def __init__(self) -> None:
         self._depth = 0  # of blocks, while there are handlers
@@ -236,7 +240,7 @@ class _Signals:
         self._hook: Callable[[sys.UnraisableHookArgs], object] = sys.__unraisablehook__
 
     def enter(self) -> None:
-        """Begin a block; in the outermost one ours take the place of the caller's handlers."""
+        """Begin a block; the outermost one replaces the caller's handlers by ours."""
         if self._handlers:  # ours are in place
             self._depth += 1
             return
@@ -292,7 +296,7 @@ class _Signals:
 
     @property
     def has_alarm(self) -> bool:
-        """Whether SIGALRM is there, and its handler is not one that could not be set again."""
+        """Return whether SIGALRM exists, and its handler can be set again."""
         return _ALARM in self._handlers
 
     def share_timer(self) -> None:
@@ -492,8 +496,10 @@ _OURS = {
 def _is_in(
     frame: FrameType | None, outer: FrameType | None, is_sought: Callable[[CodeType], bool]
 ) -> bool:
-    """Return whether one of the functions that were interrupted, from the innermost to `outer`, is
-    sought."""
+    """Return whether a function in the stack of frames is sought.
+
+    The stack begins at the innermost `frame` and ends before `outer`.
+    """
     while frame is not None and frame is not outer:
         if is_sought(frame.f_code):
             return True
@@ -502,8 +508,10 @@ def _is_in(
 
 
 def _is_ours(code: CodeType) -> bool:
-    """Return whether it is a function that begins or ends a block, or handles a signal: it must not
-    be left half."""
+    """Return whether a function begins or ends a block, or handles a signal.
+
+    It must not be interrupted halfway.
+    """
     return code in _OURS
 
 

@@ -1,4 +1,4 @@
-"""Code in other processes: a worker that can be ended at any time, pools of them, a cluster."""
+"""Run code in other processes: a worker that can be ended at any time, pools, a cluster."""
 
 import os
 

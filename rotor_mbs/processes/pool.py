@@ -288,6 +288,7 @@ def run_in(
                 again[end.failure].extend(parts or [end.task])
             else:
                 yield end
+    # One at a time: no other task then takes the memory that one of these may need.
     for end in completed(again["worker_died"], 1):
         if end.failure == "worker_died":
             yield replace(end, message=f"{end.message}, also when it was retried alone")

@@ -1,5 +1,4 @@
-"""The design of a results file: the runs that are asked for, the tables of the file, and their
-columns."""
+"""Define the design of a results file: requested runs, the tables of the file, their columns."""
 
 from __future__ import annotations
 

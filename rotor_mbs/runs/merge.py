@@ -67,6 +67,7 @@ def fit_file_to_request(
     stored = old.tables
     wanted_runs = _known_rows(new.get(RUNS))
     hashes = {row["scene"]: row["scene_hash"] for row in wanted_runs.values()}
+    # A file has one scene of each name: runs of the scene with its earlier numbers cannot stay.
     lost = [
         f"{path}: {row['scene']}: has {row['method_name']} of a scene of that name with other "
         "numbers, which this call "
@@ -82,6 +83,7 @@ def fit_file_to_request(
     for group in dict.fromkeys((*stored, *new)):
         before, made = stored.get(group), new.get(group)
         base = made or stored[group]
+        # Tables of a scene's arrays have no checksums; they follow below from the runs that stay.
         if "crc32" not in base.computed:
             continue
         asked = _known_rows(made)
@@ -109,6 +111,7 @@ def fit_file_to_request(
             methods.setdefault(scene, []).append(str(run).removeprefix(f"{scene}/"))
     for scene, own in methods.items():
         before, made = stored.get(scene), new.get(scene)
+        # Arrays of a scene with other numbers are not taken over.
         if (
             before is not None
             and made is not None
@@ -117,6 +120,7 @@ def fit_file_to_request(
             before = None
         base, columns = made or stored[scene], _joined(before, made)
         merged[scene] = TableSpec(scene, own, base.known, columns, base.attributes, base.characters)
+    # The file is kept if it has these rows and columns, and none of its rows is dropped.
     is_same = merged.keys() == stored.keys() and all(
         list(made.runs) == list(stored[group].runs)
         and made.computed.keys() == stored[group].computed.keys()

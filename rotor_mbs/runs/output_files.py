@@ -136,6 +136,7 @@ def write_file(path: Path, content: Buffer) -> None:
     A symbolic link stays, and the file that it points to is replaced; a device or a pipe is written
     to. Raises StoreError if it cannot be written.
     """
+    # A device or a pipe, such as /dev/stdout, must not be replaced by a file.
     if path.exists() and not path.is_file() and not path.is_dir():
         with store_errors(path):
             path.write_bytes(content)

@@ -1,5 +1,6 @@
-"""The progress of long calls: one line that renews itself on a terminal or in a notebook, plain
-lines in a log.
+"""Show the progress of long calls.
+
+It is one line that is overwritten on a terminal or in a notebook, or plain lines in a log.
 
 What is left is estimated from the work of the runs, which differs a thousandfold, and a run that
 failed keeps its line: tqdm counts iterations, and needs ipywidgets in a notebook.

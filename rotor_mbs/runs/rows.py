@@ -111,12 +111,14 @@ class RowLocation:
         with store_errors(self.path), self.path.open("r+b") as file:
             if os.fstat(file.fileno()).st_ino != self.inode:
                 raise StoreError(f"{self.path}: has been replaced by another file")
+            # Missing until all is written: a reader must not take a part of a row for the whole.
             for name, status in statuses.items():
                 file.seek(self.offsets[name])
                 file.write(np.full(len(status), MISSING, np.int8).data)
             for name, values in columns.items():
                 file.seek(self.offsets[name])
                 file.write(np.ascontiguousarray(values).data)
+            # The columns are on the disk before a status says so.
             file.flush()
             os.fsync(file.fileno())
             for name, status in statuses.items():
@@ -158,6 +160,7 @@ class RowLocation:
 
 def checksums(first: int, rows: Rows, row: np.dtype[np.void]) -> NDArray[np.uint32]:
     """Return the CRC-32 of each row over its number and its columns, (rows,) uint32."""
+    # Begun with the number of the row, so that a row in the place of another one is found.
     sums = [first + i & 0xFFFFFFFF for i in range(len(rows["status"]))]
     for name in (name for name in row.names or () if name != "crc32"):
         contents: Any = np.ascontiguousarray(rows[name], row[name].base).reshape(len(sums), -1)

@@ -145,6 +145,8 @@ def run_tasks(pool: TaskPool, tasks: Iterable[T]) -> Iterator[TaskEnd[T, Rows]]:
             yield end
             continue
         status = "solver_failed" if end.failure == "error" else end.failure
+        # A process may have died for reasons of the machine: nothing is stored, and the next call
+        # tries again.
         rows = None if end.failure == "worker_died" else task.failed(status, end.message)
         if rows is not None:
             task.store(rows)

@@ -1,4 +1,4 @@
-"""The file of a sweep: one table at its root.
+"""Write and read the file of a sweep, which has one table at its root.
 
 run, variant, method_code, split   (run) which run this is
 bearing_stiffness ...              (run) a variable for each varied parameter, in its own unit

@@ -113,6 +113,7 @@ class StoredTable(TableSpec):
         """
         marked, place = np.array(self.column("status")), self.place()
         statuses = np.full_like(marked, MISSING)
+        # In blocks: the rows of a large file need not fit into memory.
         step = max(_READ_BYTES // place.row_type.itemsize, 1)
         for start in range(0, len(marked), step):
             status, part = marked[start : start + step], place.at(start)

@@ -1,4 +1,4 @@
-"""Bounds of statuses and of `check`: reference/accuracy.toml, a user's own file before it."""
+"""Read bounds of statuses and of `check`: reference/accuracy.toml, and a user's own file."""
 
 from __future__ import annotations
 

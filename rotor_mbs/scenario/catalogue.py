@@ -1,4 +1,4 @@
-"""The scenes that are shipped, their names, and which ones the arguments of a command mean."""
+"""Find the scenes that are shipped, and those that the arguments of a command mean."""
 
 from __future__ import annotations
 

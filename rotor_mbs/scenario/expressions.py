@@ -1,4 +1,4 @@
-"""Arithmetic in quotes, "11*pi/12", as a number of an input file: parsed, never run as code."""
+"""Evaluate arithmetic in quotes, "11*pi/12", in an input file: parsed, never run as code."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the values of keys and settings may be, declared once, and how they are read.
+"""Declare what values of keys and settings are allowed, and read them.
 
 A `Kind` converts a value and says in words what is allowed; kinds are made from one another: a
 number, a number within limits, a list of them. A field of a dataclass declares a key of a file by

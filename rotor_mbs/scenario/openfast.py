@@ -1,4 +1,4 @@
-"""The rotor of an OpenFAST model: geometry, masses, start, and what a scene cannot hold of it.
+"""Read the rotor of an OpenFAST model: geometry, masses, start, and what a scene cannot hold.
 
 Blades have the masses that OpenFAST computes with: ElastoDyn's sum over its nodes, or the integral
 over BeamDyn's stations. OpenFAST's axes x (downwind), y, z are the scene's y, -x, z.
@@ -63,7 +63,7 @@ class BladeModel:
 
     @property
     def body(self) -> tuple[object, ...]:
-        """What makes it a body at its place, without its pitch: equal for equal blades."""
+        """Return what defines the blade as a body, without its pitch: equal for equal blades."""
         return self.mass, self.centre_of_mass, self.inertia, self.tip, self.cone
 
 
@@ -109,12 +109,12 @@ class OpenFastRotor:
 
     @property
     def has_equal_blades(self) -> bool:
-        """Whether all blades are one body, whatever their pitches are."""
+        """Return whether all blades are equal bodies, whatever their pitches are."""
         return len({blade.body for blade in self.blades}) == 1
 
     @property
     def inertia(self) -> float:
-        """Rotor inertia about the shaft, kg m², as OpenFAST's summary prints it.
+        """Return the rotor's inertia about the shaft, kg m², as OpenFAST's summary prints it.
 
         Blades are lines of mass on their pitch axes there; the generator is not in it.
         """

@@ -1,4 +1,4 @@
-"""OpenFAST's input files, read by the names of their lines.
+"""Read OpenFAST's input files by the names of their lines.
 
 A line is `value  Name  - comment`. OpenFAST itself reads by line number, so that a reader by line
 number knows one generation of files; names hardly change from FAST v8 to OpenFAST 5.
@@ -76,7 +76,7 @@ class InputFile:
 
     @cached_property
     def _entries(self) -> dict[str, tuple[int, list[str]]]:
-        """Line number and values by plain name; of a name that occurs twice, the first."""
+        """Return line number and values by plain name; of a name that occurs twice, the first."""
         entries: dict[str, tuple[int, list[str]]] = {}
         for number, line in enumerate(self.lines[_TITLE_LINES:], _TITLE_LINES + 1):
             name, values = _split_line(line)
@@ -88,7 +88,7 @@ class InputFile:
 
     @property
     def description(self) -> str:
-        """Its second line, which is free text."""
+        """Return its second line, which is free text."""
         return self.lines[1].strip() if len(self.lines) > 1 else ""
 
     def __contains__(self, name: str) -> bool:

@@ -1,4 +1,4 @@
-"""A scene file from an OpenFAST model, with comments on what of the model it holds."""
+"""Write a scene file for an OpenFAST model, with comments on what of the model it holds."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A scene: what a rotor is, what acts on it, and how it starts, as plain numbers.
+"""Describe a scene as plain numbers: the rotor, what acts on it, and how it starts.
 
 It is all that every model gets. A key of the scene file is one field, from which reading, hash,
 keys of sweeps, units and the written file follow.
@@ -354,12 +354,12 @@ class Blade:
 
     @property
     def is_point_mass(self) -> bool:
-        """Whether it has no inertia about its centre of mass."""
+        """Return whether it has no inertia about its centre of mass."""
         return not any(self.inertia)
 
     @property
     def inertia_tensor(self) -> NDArray[np.float64]:
-        """Inertia tensor about the centre of mass, (3, 3) kg m²."""
+        """Return the inertia tensor about the centre of mass, (3, 3) kg m²."""
         import numpy as np  # late: a scene is read without it
 
         xx, yy, zz, xy, xz, yz = self.inertia
@@ -393,13 +393,13 @@ class Blade:
 
     @property
     def pitch_inertia(self) -> float:
-        """Moment of inertia about the pitch axis (kg m²)."""
+        """Return the moment of inertia about the pitch axis (kg m²)."""
         zz: float = self.inertia_about_apex()[2]
         return zz
 
     @property
     def has_pitch_inertia(self) -> bool:
-        """Whether the moment of inertia about the pitch axis is not zero.
+        """Return whether the moment of inertia about the pitch axis is not zero.
 
         It is exactly zero in the paper's Fig. 4b: such a pitch is no coordinate.
         """
@@ -570,34 +570,36 @@ class Scene:
 
     @property
     def label(self) -> str:
-        """Its name; of a shipped scene that was changed, "paper/fig11, changed: blade.mass"."""
+        """Return its name; with changes to a shipped scene, "paper/fig11, changed: blade.mass"."""
         from rotor_mbs.scenario.catalogue import scene_label  # late: it reads scenes
 
         return scene_label(self)
 
     @property
     def phases(self) -> tuple[float, ...]:
-        """Azimuths at which the blades are mounted, (blades,) rad."""
+        """Return the azimuths at which the blades are mounted, (blades,) rad."""
         return tuple(2.0 * math.pi * i / len(self.blades) for i in range(len(self.blades)))
 
     @property
     def has_tilt_or_cone(self) -> bool:
-        """Whether the shaft is tilted or a blade is coned."""
+        """Return whether the shaft is tilted or a blade is coned."""
         return self.shaft_tilt != 0.0 or any(blade.cone for blade in self.blades)
 
     @property
     def has_torque(self) -> bool:
-        """Whether a torque acts on the rotor at some time."""
+        """Return whether a torque acts on the rotor at some time."""
         return any(torque != 0.0 for _, torque in self.rotor_torque)
 
     @property
     def has_constant_torque(self) -> bool:
-        """Whether the torque on the rotor is the same at all times, or none."""
+        """Return whether the torque on the rotor is the same at all times, or zero."""
         return is_constant(self.rotor_torque)
 
     @property
     def load_tables(self) -> tuple[LoadTable, ...]:
-        """Loads over time: rotor torque, then torque and rest angle of each pitch, fixed ones too.
+        """Return the loads over time: rotor torque, then torque and rest angle of each pitch.
+
+        Constant loads are included.
 
         This is the one order of the loads of a scene; `time_table.torque_place` and `rest_place`
         have their places.
@@ -606,27 +608,27 @@ class Scene:
 
     @property
     def load_segments(self) -> tuple[Segment, ...]:
-        """The run cut into segments with linear loads, in the order of `load_tables`."""
+        """Return the segments of a run in which loads are linear, in the order of `load_tables`."""
         return segments(self.load_tables, self.duration)
 
     @property
     def kink_times(self) -> list[float]:
-        """Times (s) within the run at which a load has a kink or a jump, increasing."""
+        """Return the times (s) within the run at which a load has a kink or a jump, increasing."""
         return kink_times(self.load_tables, self.duration)
 
     @property
     def has_constant_loads(self) -> bool:
-        """Whether no load changes over time."""
+        """Return whether no load changes over time."""
         return all(map(is_constant, self.load_tables))
 
     @property
     def has_damping(self) -> bool:
-        """Whether the shaft or a bearing has a damper."""
+        """Return whether the shaft or a bearing has a damper."""
         return self.shaft_damping != 0.0 or any(self.bearing_damping)
 
     @property
     def work_needs_path(self) -> bool:
-        """Whether the work is requested and must be integrated along the path.
+        """Return whether the work is requested and must be integrated along the path.
 
         The work of constant loads follows from the angles; that of dampers and of loads over time
         does not.
@@ -635,29 +637,29 @@ class Scene:
 
     @property
     def coordinate_labels(self) -> tuple[str, ...]:
-        """Labels of the coordinates, (1 + blades,): rotor, pitch 1, ..."""
+        """Return the labels of the coordinates, (1 + blades,): rotor, pitch 1, ..."""
         return coordinate_labels(len(self.blades))
 
     @property
     def moving_coordinates(self) -> list[int]:
-        """Columns of the coordinates with inertia: 0 (rotor), and those of pitches with inertia."""
+        """Return the columns of the coordinates with inertia: 0 (rotor), and those of pitches."""
         pitches = [i for i, blade in enumerate(self.blades, 1) if blade.has_pitch_inertia]
         return [0, *pitches]
 
     @property
     def bearings(self) -> list[tuple[float, float]]:
-        """Stiffness (N m/rad) and damping (N m s/rad) of each pitch bearing."""
+        """Return stiffness (N m/rad) and damping (N m s/rad) of each pitch bearing."""
         none = (0.0,) * len(self.blades)
         return list(zip(self.bearing_stiffness or none, self.bearing_damping or none, strict=True))
 
     @property
     def dampings(self) -> tuple[float, ...]:
-        """Damping of the shaft, then of each pitch bearing: (1 + blades,) N m s/rad."""
+        """Return the damping of the shaft, then of each pitch bearing: (1 + blades,) N m s/rad."""
         return self.shaft_damping, *(damping for _, damping in self.bearings)
 
     @property
     def pitch_loads(self) -> list[tuple[LoadTable, LoadTable]]:
-        """Torque (N m) and rest angle (rad; none without stiffness) of each pitch over time."""
+        """Return torque (N m) and rest angle (rad; () without stiffness) of each pitch over time."""
         none: tuple[LoadTable, ...] = ((),) * len(self.blades)
         torques, rests = self.pitch_torque or none, self.bearing_rest or none
         loads = []
@@ -667,7 +669,7 @@ class Scene:
 
     @property
     def rotor_key(self) -> tuple[object, ...]:
-        """Parameters and loads: what scenes share that differ in start, run or labels alone."""
+        """Return parameters and loads, equal for scenes that differ only in start, run or label."""
         return tuple(_rotor_values(self))
 
     def replace(self, **changes: Any) -> Scene:
@@ -926,7 +928,7 @@ class SceneChange(NamedTuple):
 
     @property
     def key(self) -> str:
-        """The key as it is written, "initial.angles[1]"."""
+        """Return the key as it is written, "initial.angles[1]"."""
         return shown_key(self.path)
 
     def __str__(self) -> str:

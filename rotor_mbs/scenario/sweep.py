@@ -1,4 +1,4 @@
-"""A sweep file: a scene and what is varied, or every error of the file at once."""
+"""Read a sweep file: a scene and what is varied, or every error of the file at once."""
 
 from __future__ import annotations
 
@@ -150,7 +150,7 @@ class Axis:
 
     @property
     def is_drawn(self) -> bool:
-        """Whether its values are random, or those of a Sobol sequence."""
+        """Return whether its values are random, or those of a Sobol sequence."""
         return any(getattr(self, name) is not None for name in DRAWN)
 
 
@@ -268,7 +268,7 @@ class Design:
 
     @functools.cached_property
     def _digits(self) -> list[list[int]]:
-        """Axes that move together, as lists of axis numbers, slowest first."""
+        """Return groups of axes that move together, as lists of axis numbers, slowest first."""
         if self.combine == "zip":
             return [list(range(len(self.axes)))]
         drawn = [i for i, axis in enumerate(self.axes) if axis.is_drawn]
@@ -282,7 +282,7 @@ class Design:
 
     @property
     def counts(self) -> tuple[int, ...]:
-        """Number of values of each axis, (axes,), without making them."""
+        """Return the number of values of each axis, (axes,), without computing the values."""
         counts = []
         for axis in self.axes:
             spaced = axis.linear or axis.log
@@ -296,12 +296,12 @@ class Design:
 
     @property
     def count(self) -> int:
-        """Number of rows."""
+        """Return the number of rows."""
         return math.prod(self.shape)
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Number of values along every digit of a grid, slowest first."""
+        """Return the number of values along every digit of a grid, slowest first."""
         counts = self.counts
         return tuple(counts[digit[0]] for digit in self._digits)
 
@@ -490,22 +490,22 @@ class Sweep:
 
     @property
     def name(self) -> str:
-        """Name of the file, without its ending."""
+        """Return the name of the file, without its ending."""
         return self.path.stem
 
     @property
     def keys(self) -> tuple[str, ...]:
-        """Key of each axis, (axes,)."""
+        """Return the key of each axis, (axes,)."""
         return tuple(axis.key for axis in self.design.axes)
 
     @property
     def units(self) -> tuple[str, ...]:
-        """Unit of each axis, (axes,); "1" for none."""
+        """Return the unit of each axis, (axes,); "1" for none."""
         return tuple(unit_of(parse_key(key)) for key in self.keys)
 
     @property
     def outputs(self) -> tuple[str, ...]:
-        """What is stored of each run's samples; () for metrics alone."""
+        """Return what is stored of each run's samples; () for metrics alone."""
         return self.base.outputs if self.design.outputs is None else tuple(self.design.outputs)
 
     def variants(self) -> Variants:

@@ -1,4 +1,4 @@
-"""Prescribed loads over time: tables, segments between their kinks, and stops of an engine.
+"""Represent prescribed loads over time: tables, linear segments, and stops of an engine.
 
 A table has rows (t, value), t in s. A load is linear between the rows, and constant before the
 first and after the last; two rows with equal t are a jump. A step over a kink or a jump would lose
@@ -116,13 +116,13 @@ class Segment:
 
     @functools.cached_property
     def values(self) -> tuple[float, ...]:
-        """Loads at the start of the segment, (loads,)."""
+        """Return the loads at the start of the segment, (loads,)."""
         start = Fraction(self.start)
         return tuple(float(offset + slope * start) for offset, slope in self.linear_loads)
 
     @functools.cached_property
     def slopes(self) -> tuple[float, ...]:
-        """Slopes of the loads, (loads,), per s."""
+        """Return the slopes of the loads, (loads,), per s."""
         return tuple(float(slope) for _, slope in self.linear_loads)
 
     def at(self, load: int, time: Time) -> Time:

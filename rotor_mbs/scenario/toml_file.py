@@ -1,4 +1,4 @@
-"""TOML text: read from a file with limits, written, and the line on which each key stands."""
+"""Read TOML text with limits, write it, and find the line on which each key stands."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class KeyProblem(NamedTuple):
 
     @property
     def message(self) -> str:
-        """The problem in one line."""
+        """Return the problem in one line."""
         message = f"{shown_key(self.path)}: {self.wrong}" if self.path else self.wrong
         return f"{message}; allowed: {self.allowed}" if self.allowed else message
 
