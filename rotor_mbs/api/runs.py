@@ -662,7 +662,8 @@ class Runs(Mapping[Any, Any]):
                 if len(keys) == 1:
                     return data.swap_dims(run=keys[0]).drop_vars("run")
                 values = [data[key].values.tolist() for key in keys]
-                # Unstacked, a missing combination would be NaN, and one that occurs twice has no place.
+                # Unstacked, a missing combination would be NaN, and one that occurs twice has no
+                # place.
                 combinations = len(set(zip(*values, strict=True)))
                 if (
                     not combinations

@@ -89,8 +89,8 @@ def _run(words: list[str]) -> int:
             with _signals_as_interrupts(), warnings.catch_warnings(), system_errors_apart():
                 warnings.simplefilter("always", PlausibilityWarning)
                 warnings.showwarning = _print_warning
-                # Loaded here: an interrupt, or a lack of memory, while code is loaded ends the command
-                # in the same way as later.
+                # Loaded here: an interrupt, or a lack of memory, while code is loaded ends the
+                # command in the same way as later.
                 from rotor_mbs.cli.arguments import load_methods, parse
 
                 arguments = parse(words)

@@ -659,7 +659,10 @@ class Scene:
 
     @property
     def pitch_loads(self) -> list[tuple[LoadTable, LoadTable]]:
-        """Return torque (N m) and rest angle (rad; () without stiffness) of each pitch over time."""
+        """Return the torque (N m) and the rest angle (rad) of each pitch over time.
+
+        A rest angle without stiffness is ().
+        """
         none: tuple[LoadTable, ...] = ((),) * len(self.blades)
         torques, rests = self.pitch_torque or none, self.bearing_rest or none
         loads = []
