@@ -14,17 +14,26 @@ from rotor_mbs.scenario.toml_file import file_path
 def open(path: str | os.PathLike[str]) -> Any:
     """Open a file that this program wrote.
 
-    Raises StoreError for other files, TypeError if `path` is neither text nor a path.
+    Parameters
+    ----------
+    path : of the file.
 
     Returns
     -------
     Runs
-        Of a results file or a sweep. The labels of a file with one scene are method names.
+        For a results file or a sweep. The labels of a file with one scene are method names.
     Modes, DataComparison
-        Of a file of modes, or of comparisons; if it has several, a dict by scene, or by scene and
+        For a file of modes, or of comparisons; if it has several, a dict by scene, or by scene and
         name.
     BenchCurves
-        Of a results file that has no runs but the curves of `rotor-mbs bench`.
+        For a results file that has no runs but the curves of `rotor-mbs bench`.
+
+    Raises
+    ------
+    StoreError
+        For any other file, and one that is damaged.
+    TypeError
+        If `path` is neither text nor a path.
 
     Examples
     --------

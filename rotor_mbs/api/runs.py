@@ -85,10 +85,18 @@ def scenes(folder: str = "") -> list[str]:
 
 
 def scene(name: str) -> Scene:
-    """Return a shipped scene, or that of a TOML file.
+    """Return a shipped scene, or the scene in a TOML file.
 
-    Raises InputError, with the most similar name, if there is none of that name, and TypeError if
-    it is no text.
+    Parameters
+    ----------
+    name : of a shipped scene, or the path of a TOML file.
+
+    Raises
+    ------
+    InputError
+        If there is no such scene; the message has the most similar name.
+    TypeError
+        If `name` is neither text nor a path.
 
     Examples
     --------

@@ -134,6 +134,10 @@ def _prepare_reading(arguments: argparse.Namespace) -> None:
     """Start the process that reads the file named in the arguments, if it is one of this program.
 
     It starts while the command's code is loaded.
+
+    Parameters
+    ----------
+    arguments : of a command; `file` or `scene` may name such a file.
     """
     name = getattr(arguments, "file", None) or getattr(arguments, "scene", None)
     if not isinstance(name, str | os.PathLike):

@@ -222,7 +222,11 @@ def line(check: Check) -> str:
     """Return a check as one line of text.
 
     It has the outcome, what was checked in which run, the value, the bound, the margin, and for a
-    failure its probable reason.
+    failure or an allowed change its probable reason.
+
+    Parameters
+    ----------
+    check : the check; control characters in it are escaped.
     """
     outcome = "pass" if check.passed else "FAIL"
     margin = "inf" if math.isinf(check.margin) else f"{check.margin:.3g}"

@@ -214,7 +214,17 @@ _of_files: dict[str, Method] = {}
 
 
 def _with_files(names: Sequence[str]) -> list[str]:
-    """Return the names with those of a file's methods in place of its path. Raises InputError."""
+    """Return the names with the path of each file replaced by the names of its methods.
+
+    Parameters
+    ----------
+    names : of methods, and paths of Python files.
+
+    Raises
+    ------
+    InputError
+        If a file cannot be loaded, or two files have the same name.
+    """
     expanded: list[str] = []
     paths: dict[str, str] = {}  # by model
     for name in names:
@@ -246,9 +256,13 @@ def _add(file: MethodFile) -> list[str]:
 
 
 def with_method_files(work: Callable[..., R]) -> Callable[..., R]:
-    """Return a function for another process, where the method files of this one are known first.
+    """Return a function for another process, where it loads the method files of this one first.
 
-    What they print goes nowhere there.
+    What is printed there, also by `work`, is dropped.
+
+    Parameters
+    ----------
+    work : the function; it is returned itself if no files are named.
     """
     if not _files:
         return work
@@ -258,7 +272,10 @@ def with_method_files(work: Callable[..., R]) -> Callable[..., R]:
 def _with_files_of(
     process_id: int, files: Sequence[MethodFile], work: Callable[..., R], *arguments: object
 ) -> R:
-    """Call a function where the methods of files are known."""
+    """Call a function after the methods of files have been loaded.
+
+    In another process than `process_id`, which created the call, its output is dropped.
+    """
     for file in files:
         _add(file)
     with nullcontext() if os.getpid() == process_id else quiet():

@@ -180,7 +180,10 @@ class MethodFile:
 def located(error: BaseException, paths: Iterable[str]) -> str:
     """Return an error in one line.
 
-    It has the file and line number if it was raised in one of the files `paths`.
+    Parameters
+    ----------
+    error : the error.
+    paths : files; the line has the file and line number if the error was raised in one of them.
     """
     paths = list(paths)
     if isinstance(error, SyntaxError) and error.filename in paths:

@@ -124,6 +124,10 @@ def singular_reason(scene: Scene) -> str:
     """Return why the mass matrix of a scene is, or must become, singular; "" if it need not.
 
     Only point-mass blades on a hub without inertia can make it so.
+
+    Parameters
+    ----------
+    scene : the scene; its mass matrix depends on the pitches.
     """
     if not _largest_rotor_inertia(scene):
         return "no inertia about the shaft; allowed: a hub or blade with inertia"

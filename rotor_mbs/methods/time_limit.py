@@ -263,7 +263,12 @@ class _Signals:
             raise
 
     def leave(self, error: BaseException | None) -> None:
-        """End a block that `error` leaves; raises what a handler has raised in it."""
+        """End a block; raise the exception that a handler of the caller has raised in it.
+
+        Parameters
+        ----------
+        error : with which the block ends, or None.
+        """
         if self._depth > 1:
             self._depth -= 1
             raised = self._raised

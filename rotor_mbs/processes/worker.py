@@ -189,7 +189,13 @@ class Worker:
         self.close()
 
     def _started(self) -> _Process:
-        """Start a process and send it the request to set itself up. Raises ResourceError."""
+        """Start a process and send it the request to set itself up.
+
+        Raises
+        ------
+        ResourceError
+            If the system cannot start it, or takes too long.
+        """
         from concurrent.futures import wait  # late: `rotor-mbs list` starts no process
 
         beginning: Future[_Process] | None = None

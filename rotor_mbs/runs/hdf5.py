@@ -358,7 +358,12 @@ def _dimension(dataset: Any, axis: int, name: str, scale_names: dict[int, str]) 
 
 
 def columns_of(datasets: Mapping[str, Any]) -> dict[str, Column]:
-    """Describe the datasets of a group, by name."""
+    """Return the descriptions of the datasets of a group, by name.
+
+    Parameters
+    ----------
+    datasets : the HDF5 datasets by name.
+    """
     columns = {}
     scale_names: dict[int, str] = {}
     for name, dataset in datasets.items():

@@ -131,10 +131,20 @@ def replace_file(path: Path, content: Buffer, mark: bytes) -> None:
 
 
 def write_file(path: Path, content: Buffer) -> None:
-    """Write `content` under a temporary name beside `path`, force it to the disk, then rename it.
+    """Write a file under a temporary name, force it to the disk, then rename it.
 
     A symbolic link stays, and the file that it points to is replaced; a device or a pipe is written
-    to. Raises StoreError if it cannot be written.
+    to.
+
+    Parameters
+    ----------
+    path : of the file.
+    content : bytes.
+
+    Raises
+    ------
+    StoreError
+        If it cannot be written; an earlier file is then unchanged.
     """
     # A device or a pipe, such as /dev/stdout, must not be replaced by a file.
     if path.exists() and not path.is_file() and not path.is_dir():

@@ -137,10 +137,14 @@ class StoredTable(TableSpec):
                         file.write(blank.data)
 
     def place(self, row: int = 0) -> RowLocation:
-        """Return the location of the rows from `row` on.
+        """Return the location of the rows from one on.
 
         Their checksums begin with the number of the run if runs are numbered, otherwise with that
         of the row.
+
+        Parameters
+        ----------
+        row : number of the first row, from 0.
         """
         is_numbered = (
             isinstance(self.runs, np.ndarray) and self.runs.dtype.kind == "i" and len(self.runs) > 0

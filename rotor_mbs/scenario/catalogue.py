@@ -249,7 +249,17 @@ def _title(path: Path) -> str:
 
 
 def _files(argument: str) -> list[Path]:
-    """Return the scene files that an argument means. Raises InputError where there are none."""
+    """Return the scene files that an argument of a command means.
+
+    Parameters
+    ----------
+    argument : name of a shipped scene or folder, or path of a TOML file or a folder of such files.
+
+    Raises
+    ------
+    InputError
+        If there are none.
+    """
     shipped = _shipped()
     if argument in shipped:
         return [shipped[argument]]

@@ -332,7 +332,13 @@ def whole(lowest: int, highest: int, allowed: str = "") -> Kind:
 
 
 def choice(options: Sequence[object], allowed: str = "") -> Kind:
-    """Return the kind of a value that is one of `options`; `allowed`: in other words."""
+    """Return the kind of a value that is one of some options.
+
+    Parameters
+    ----------
+    options : the allowed values.
+    allowed : what is allowed, in words; by default the options.
+    """
     are_texts = all(isinstance(option, str) for option in options)
     names = [str(option) for option in options]
 

@@ -195,12 +195,22 @@ def _text(number: float) -> str:
 
 
 def _hub_inertia(structure: InputFile, count: int) -> tuple[float, str]:
-    """Return the hub's inertia about the shaft, kg m², and it as arithmetic of the file's numbers.
+    """Return the hub's inertia about the shaft, and its text as arithmetic of the file's numbers.
 
     Parameters
     ----------
     structure : ElastoDyn's primary file.
     count : number of blades.
+
+    Returns
+    -------
+    float, str
+        In kg m².
+
+    Raises
+    ------
+    InputError
+        If the inertia about the shaft of a two-bladed rotor is negative.
     """
     inertia = structure.number("HubIner", keys.NOT_NEGATIVE)
     if count != 2 or "HubIner_Teeter" in structure:
@@ -274,6 +284,11 @@ def _elastodyn_blade(main: InputFile, structure: InputFile, number: int) -> Blad
     ----------
     main, structure : the .fst file and ElastoDyn's primary file.
     number : of the blade, from 1.
+
+    Raises
+    ------
+    InputError
+        If the blade has no mass.
     """
     tip_radius, hub_radius = structure.number("TipRad"), structure.number("HubRad")
     length = tip_radius - hub_radius
@@ -316,9 +331,18 @@ def _elastodyn_blade(main: InputFile, structure: InputFile, number: int) -> Blad
 
 
 def _blade_table(file: InputFile) -> tuple[list[float], list[float]]:
-    """Return fractions of the length and masses per length of a blade file's stations.
+    """Return fractions of the length and masses per length (kg/m) of a blade file's stations.
 
-    Columns differ between generations of files, and are found by their names.
+    Columns differ between versions of the file, and are found by their names.
+
+    Parameters
+    ----------
+    file : ElastoDyn's file of the blade.
+
+    Raises
+    ------
+    InputError
+        If the table is missing, fractions do not rise from 0 to 1, or a mass is negative.
     """
     count = file.whole("NBlInpSt", 2, MAX_ROWS)
     header = file.line_with("BlFract", "BMassDen")
@@ -361,12 +385,17 @@ def _nodes(
     blade: InputFile,
     length: float,
 ) -> tuple[list[float], list[float], str]:
-    """Return distances from the root and widths of a blade's nodes, m, and what they are.
+    """Return distances from the root and widths (m) of a blade's nodes, and a description.
 
     Parameters
     ----------
     main, structure, blade : the .fst file, ElastoDyn's primary file, a blade file.
     length : of the blade, m.
+
+    Raises
+    ------
+    InputError
+        If the model has AeroDyn 14, and its file has no table of nodes.
     """
     # 1 is AeroDyn 14, with whose nodes ElastoDyn computes; or since OpenFAST 4, whose blade files
     # have no column PitchAxis, AeroDisk.
@@ -460,6 +489,11 @@ def _beamdyn_blade(main: InputFile, structure: InputFile, number: int) -> BladeM
     ----------
     main, structure : the .fst file and ElastoDyn's primary file.
     number : of the blade, from 1.
+
+    Raises
+    ------
+    InputError
+        If all key points are equal, or the blade has no mass.
     """
     import numpy as np  # late: a scene is read without it
 
@@ -500,6 +534,7 @@ def _beamdyn_blade(main: InputFile, structure: InputFile, number: int) -> BladeM
         raise sections.problem("station_total", "the blade has no mass", "a mass above 0")
 
     centre = moment / mass
+    # The scene's x is OpenFAST's -y, its y OpenFAST's x (downwind).
     to_scene = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     about_centre = to_scene @ (about_root - mass * _steiner(centre)) @ to_scene.T
     if structure.flag("PitchDOF"):
@@ -512,6 +547,7 @@ def _beamdyn_blade(main: InputFile, structure: InputFile, number: int) -> BladeM
         source=f"integral over BeamDyn's {len(fractions)} stations",
         mass=float(mass),
         first_moment=float(moment[2]),
+        # The integral of z² over the mass, by the moments of inertia about the root.
         second_moment=float(0.5 * (about_root[0, 0] + about_root[1, 1] - about_root[2, 2])),
         centre_of_mass=(x, y, z),
         inertia=(xx, yy, zz, xy, xz, yz),

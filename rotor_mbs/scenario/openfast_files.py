@@ -50,8 +50,13 @@ class InputFile:
         Parameters
         ----------
         path : of the file.
-        named_by : the file, line and name that ask for it, for messages: "a.fst:31: EDFile".
-        what : what it is to be, for messages.
+        named_by : the file, line and name that refer to it, for messages: "a.fst:31: EDFile".
+        what : kind of the file, for messages.
+
+        Raises
+        ------
+        InputError
+            If the file cannot be read.
         """
         self.path = path
         shown = f"{named_by}: {shown_path(path)}" if named_by else shown_path(path)
@@ -218,10 +223,14 @@ def _plain(name: str) -> str:
 
 
 def _split_line(line: str) -> tuple[str, list[str]]:
-    """Return the plain name and the values of a line; "" and [] where it has none.
+    """Return the plain name and the values of a line; "" and [] if it has none.
 
     The first word is a value. Numbers, flags and texts in quotes behind it are values, too, since
     some lines are lists: `30, 60  LinTimes  - comment`.
+
+    Parameters
+    ----------
+    line : of an input file of OpenFAST.
     """
     if line.lstrip()[:2] in ("--", "==") or line.lstrip()[:1] in ("!", "#", "%"):
         return "", []

@@ -68,7 +68,12 @@ def scene_of_rotor(rotor: OpenFastRotor) -> Scene:
 
 
 def scene_text(rotor: OpenFastRotor) -> str:
-    """Return a commented scene file of a rotor."""
+    """Return a commented scene file of a rotor.
+
+    Parameters
+    ----------
+    rotor : as it was read from the OpenFAST model.
+    """
     duration = min(rotor.duration, MAX_DURATION) or 10.0
     title = _on_one_line(f"{rotor.path.stem}: {rotor.description}")[:MAX_TEXT].rstrip(": ")
     lines = [

@@ -167,7 +167,11 @@ def _read_load(value: object) -> LoadTable:
 def _per_blade(kind: Kind) -> Kind:
     """Return the kind of one value for every pitch bearing, or a list with one for each.
 
-    It is read as a tuple, () where all are zero.
+    It is read as a tuple, () if all are zero.
+
+    Parameters
+    ----------
+    kind : of a single value.
     """
 
     def read(value: Any, scene: Mapping[str, Any]) -> tuple[Any, ...]:
@@ -213,9 +217,9 @@ def _check_bare_pitches(what: str, entries: Sequence[Any], scene: Mapping[str, A
 
     Parameters
     ----------
-    what : what such an entry is, before the blades in the message.
+    what : meaning of such an entry, which precedes the blades in the message.
     entries : one per blade.
-    scene : values of the keys before it by field; without the blades nothing is checked.
+    scene : values of the earlier keys by field; without the blades nothing is checked.
     """
     if "blade_count" not in scene or "blades" not in scene:
         return
@@ -237,7 +241,12 @@ def _read_blades(value: object, scene: Mapping[str, Any]) -> tuple[Blade, ...]:
     Parameters
     ----------
     value : a table, or a list of them.
-    scene : values of the keys before it by field.
+    scene : values of the earlier keys by field.
+
+    Raises
+    ------
+    TableError
+        For a wrong table, or another number of tables than blades.
     """
 
     def read_blade(table: object) -> Blade:
@@ -862,7 +871,12 @@ def scene_from_tables(
 
 
 def scene_tables(scene: Scene) -> dict[str, Any]:
-    """Return the scene as tables of a scene file: numbers as they are, without keys at defaults."""
+    """Return the scene as tables of a scene file, without keys that have their default.
+
+    Parameters
+    ----------
+    scene : its numbers are returned as they are.
+    """
     tables: dict[str, Any] = {"blades": len(scene.blades)}
     for field in fields(Scene):
         value = getattr(scene, field.name)
@@ -901,7 +915,12 @@ def _blade_tables(scene: Scene) -> dict[str, Any] | list[dict[str, Any]]:
 
 
 def scene_keys(scene: Scene) -> list[tuple[KeyPath, Any]]:
-    """Return the path and the value of each key of the scene's file, see `scene_tables`."""
+    """Return the path and the value of each key of a scene's file.
+
+    Parameters
+    ----------
+    scene : its keys are those of `scene_tables`.
+    """
     found: list[tuple[KeyPath, Any]] = []
 
     def collect(value: Any, path: KeyPath) -> None:
@@ -1345,7 +1364,13 @@ def _as_degrees(angle: float) -> str:
 
 
 def _implausible_blade(name: str, blade: Blade) -> list[str]:
-    """Return a line for each number of a blade, called `name`, that looks like a slip."""
+    """Return a line for each number of a blade that seems to be a mistake.
+
+    Parameters
+    ----------
+    name : of the blade in the line.
+    blade : the blade, in SI units.
+    """
     lines = []
     if not MIN_MASS <= blade.mass <= MAX_MASS:
         lines.append(f"{name}.mass: {blade.mass:g} kg; is it in kg?")

@@ -431,7 +431,17 @@ class Variants:
         return self.__dict__ | {"_rotors": self._rotors if has_one_rotor else {}}
 
     def scene(self, values: Sequence[float]) -> Scene:
-        """Return the scene with some values, one for each key. Raises TableError as for a file."""
+        """Return the scene with one value for each varied key.
+
+        Parameters
+        ----------
+        values : in the order of the keys.
+
+        Raises
+        ------
+        TableError
+            As for a file with these values.
+        """
         pairs = list(zip(self._paths, values, strict=True))
         rotor_numbers = tuple(value for path, value in pairs if not _is_of_start(path))
         if rotor_numbers not in self._rotors:

@@ -136,14 +136,19 @@ class TomlFile:
 
 
 def file_path(path: str | os.PathLike[str]) -> Path:
-    """Return a path that a file may have, whether there is one or not.
+    """Return a path that a file can have, whether the file exists or not.
+
+    Parameters
+    ----------
+    path : text or a path.
 
     Raises
     ------
     TypeError
         If it is neither text nor a path.
     InputError
-        If no file can have it: a NUL, half a surrogate pair, a name longer than the system takes.
+        If no file can have it: it has a NUL or half a surrogate pair, or is too long for the
+        system.
     """
     path = Path(path)
     try:
@@ -235,7 +240,18 @@ def read_toml(path: Path) -> TomlFile:
 
 
 def parse_toml(text: str, source: str) -> TomlFile:
-    """Return a TOML text as a file that messages call `source`. Raises InputError with one line."""
+    """Return the tables of a TOML text.
+
+    Parameters
+    ----------
+    text : the content of a file.
+    source : its name in messages.
+
+    Raises
+    ------
+    InputError
+        With one line, if the text is not TOML, or is beyond the limits.
+    """
     too_long = _LONG_KEY.search(text)
     if too_long:
         line = text.count("\n", 0, too_long.start()) + 1
@@ -256,9 +272,16 @@ def parse_toml(text: str, source: str) -> TomlFile:
 
 
 def plain_value(value: Any) -> Any:
-    """Return a value of Python as a TOML file has it: arrays, tuples, ranges, generators as lists.
+    """Return a Python value as a TOML file has it; arrays and other iterables become lists.
 
-    Raises TypeError for what no file can have, such as None or bytes.
+    Parameters
+    ----------
+    value : a single value, a mapping, or an iterable such as an array, tuple, range or generator.
+
+    Raises
+    ------
+    TypeError
+        For a value that no file can have, such as None or bytes.
     """
     if hasattr(value, "tolist"):  # of NumPy
         value = value.tolist()
@@ -293,7 +316,17 @@ def as_text(value: object) -> str:
 
 
 def toml_value(value: object) -> str:
-    """Return a value in TOML: numbers bit for bit, mappings as inline tables. Raises InputError."""
+    """Return a value as TOML text: numbers bit for bit, mappings as inline tables.
+
+    Parameters
+    ----------
+    value : plain, see `plain_value`.
+
+    Raises
+    ------
+    InputError
+        For a whole number with more digits than Python converts.
+    """
     if isinstance(value, Mapping):
         entries = [f"{json.dumps(key)} = {toml_value(entry)}" for key, entry in value.items()]
         return f"{{{', '.join(entries)}}}"
