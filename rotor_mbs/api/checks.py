@@ -143,12 +143,6 @@ def test_method(name: str | os.PathLike[str], *, timeout: float = 60.0) -> Check
     >>> import rotor_mbs as rm
     >>> rm.test_method("lagrange/dop853").passed                         # doctest: +SKIP
     True
-
-    Examples
-    --------
-    >>> import rotor_mbs as rm
-    >>> rm.test_method("lagrange/dop853").passed                         # doctest: +SKIP
-    True
     """
     from rotor_mbs.studies.method_test import examine  # late: models
 

@@ -34,8 +34,8 @@ if TYPE_CHECKING:
     import argparse
 
 EXIT_OK, EXIT_FAILED, EXIT_BAD_INPUT, EXIT_INTERRUPTED = 0, 1, 2, 130
-# Commands that only print: a reader who has seen enough (`rotor-mbs list | head`) has missed
-# nothing.
+# Commands that only print: if the reader closes the pipe (`rotor-mbs list | head`), this is no
+# failure.
 _ONLY_PRINT = ("list", "show")
 
 _received_signals: list[int] = []  # that this call was to end by
@@ -117,7 +117,7 @@ def _run(words: list[str]) -> int:
                     if isinstance(exc, InputError | MethodRefusal | StoreError)
                     else EXIT_FAILED
                 )
-            # Without memory for a library, its loading raises either.
+            # If memory lacks for a library, its import raises a SystemError or an ImportError.
             print_line(f"code cannot be loaded: {type(exc).__name__}: {exc}", sys.stderr)
             return EXIT_FAILED
         except MemoryError as exc:
@@ -144,7 +144,7 @@ def _prepare_reading(arguments: argparse.Namespace) -> None:
         return
     from rotor_mbs.runs.trailer import is_of_this_program
 
-    with suppress(OSError):  # one that cannot be read is told by the command
+    with suppress(OSError):  # the command reports a file that cannot be read
         if is_of_this_program(Path(name)):
             from rotor_mbs.runs.untrusted import prepare_reading
 

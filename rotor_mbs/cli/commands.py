@@ -513,7 +513,7 @@ def sweep(arguments: argparse.Namespace) -> int:
     """
     from rotor_mbs.runs.engines import open_task_pool
 
-    # its workers load their code meanwhile
+    # opened first: its workers load their code while the sweep is read
     with open_task_pool(arguments.engine, arguments.jobs) as pool:
         from rotor_mbs.scenario.sweep import load_sweep
         from rotor_mbs.studies.sweep import plan_sweep, run_sweep
@@ -560,7 +560,8 @@ def sweep(arguments: argparse.Namespace) -> int:
         except StoreError as exc:
             print_line(str(exc), sys.stderr)
             is_full = isinstance(exc.__cause__, OSError) and exc.__cause__.errno in _DISK_IS_FULL
-            # What is stored stays, the same command continues; else nothing was begun.
+            # With stored runs this is a failure: the same command continues. Without any, the file
+            # is bad input.
             return EXIT_FAILED if is_full or made else EXIT_BAD_INPUT
         if arguments.json:
             facts = {

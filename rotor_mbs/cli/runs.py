@@ -50,7 +50,7 @@ def run(arguments: argparse.Namespace) -> int:
     scenes = [scene for scene in scenes if methods[scene.name]]
     if not scenes:
         raise InputError(map(str, refused))
-    # A setting that refused methods alone have is none of the others'.
+    # Without those of refused methods alone: a setting that no method has is an error.
     settings = settings_of_any([name for able in methods.values() for name in able], settings)
     with ProgressLine() as progress:
         report = run_scenes(

@@ -23,12 +23,12 @@ from rotor_mbs.runs.read import is_sweep
 from rotor_mbs.scenario.accuracy_bounds import read_bounds, shipped_bounds
 from rotor_mbs.studies import check as study
 
-# Annotations: GitHub shows as many of a step and drops the others silently. Also lines about
-# shrunken margins.
+# Largest number of annotations: GitHub shows ten of a step, and drops the others silently. Also of
+# lines about margins that have shrunk.
 WORST = 10
 
 
-# What is found in every output of a kind.
+# Regular expressions that are found in every output of a kind, see `refuse_foreign`.
 JUNIT = rb'<testsuites name="rotor-mbs check"'
 JSON = rb'\A\[\]\Z|\A\[\n \{\n  "check": "'
 
@@ -84,7 +84,7 @@ def check(arguments: argparse.Namespace) -> int:
             verdicts.append(study.runs_gone(arguments.file, arguments.against))
 
     _write_verdicts(arguments, verdicts)
-    # standard output is the JSON's alone
+    # then standard output has only the JSON
     stream = sys.stderr if arguments.json == Path("-") else sys.stdout
     failures = [verdict for verdict in verdicts if not verdict.passed]
     annotated = worst_first(failures)[:WORST] if arguments.github else []
@@ -231,7 +231,7 @@ def line(check: Check) -> str:
     outcome = "pass" if check.passed else "FAIL"
     margin = "inf" if math.isinf(check.margin) else f"{check.margin:.3g}"
     unit = f" {check.unit}" if check.unit else ""
-    # an allowed change, too
+    # also an allowed change
     is_told = not check.passed or (check.name == study.CHANGED and check.value > 0.0)
     hint = f"; {check.hint}" if is_told else ""
     return escaped(

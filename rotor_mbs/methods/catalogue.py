@@ -138,7 +138,7 @@ def is_corrected(name: str) -> bool:
 def default_methods() -> tuple[str, ...]:
     """Return the names of the methods that run where none is named.
 
-    A fallback stands in place of one that is not installed.
+    A method that is not installed is replaced by its fallback.
     """
     names = []
     for method in methods():

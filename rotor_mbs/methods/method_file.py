@@ -47,7 +47,7 @@ class MethodFile:
     text : its content.
     """
 
-    path: str  # as it is named
+    path: str  # as it is given
     text: str
 
     @property
@@ -173,7 +173,7 @@ class MethodFile:
             yield
         except RotorError:
             raise
-        except (Exception, SystemExit) as exc:  # whatever somebody's code raises
+        except (Exception, SystemExit) as exc:  # code of others may raise any type
             raise InputError(located(exc, [self.path])) from exc
 
 
@@ -227,7 +227,7 @@ def read_file(path: str) -> MethodFile:
 
 # where files are loaded by several threads, their output is restored in order
 _loading = threading.Lock()
-_worker = Worker(is_silent=True)  # that loads files; somebody's code may end or hang it
+_worker = Worker(is_silent=True)  # that loads files; code of others may end or hang it
 atexit.register(_worker.close)
 
 
@@ -255,7 +255,7 @@ def _ask(file: MethodFile, built: tuple[str, Scene] | None, late: str, ended: st
             if built is not None:
                 raise
         # The process has the modules that the file imports, and the import path, as they were: a
-        # new one sees what was mended since.
+        # new one sees what was corrected since.
         _worker.end_process()
         return _worker.run(_answer, (file, built), _LOAD_S)
     except TaskLostError as exc:

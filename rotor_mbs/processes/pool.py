@@ -142,8 +142,8 @@ class WorkerPool(TaskPool):
     def submit(self, work: Callable[[T], R], task: T, timeout_s: float) -> Future[R]:
         """Return the future of `work(task)`, which ends as `Worker.run` does.
 
-        What goes in and out must be picklable; the time limit counts from when a process begins
-        with the task. Raises ResourceError.
+        Function, task and result must be picklable; the time limit counts from when a process
+        begins with the task. Raises ResourceError.
         """
         return self._in_thread(self._run, work, task, timeout_s)
 

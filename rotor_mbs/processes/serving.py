@@ -35,7 +35,7 @@ def serve() -> None:
         threading.Thread(target=_receive, args=(requests, received), daemon=True).start()
         while True:
             send(answers, _answer(received.get()))
-    finally:  # an exit or an error: nothing is left to do, and nobody to tell
+    finally:  # on an exit or an error: the parent sees that this process has ended
         os._exit(1)
 
 

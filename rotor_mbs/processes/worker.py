@@ -215,7 +215,7 @@ class Worker:
             process = beginning.result()
             process.send(pickle.dumps(("", pickle.dumps((self._set_up, self._initializer)))))
         except BaseException:
-            if beginning is not None:  # nobody waits for it any more
+            if beginning is not None:  # no caller waits for it any more
                 beginning.add_done_callback(_end_begun)
             raise
         return process
@@ -319,7 +319,7 @@ class _Process(subprocess.Popen[bytes]):
                 answer = pickle.load(self.stdout)
             except Exception as exc:
                 # Most errors of a pipe are signs of an end. But a handler of a signal may raise
-                # any type, and memory may be lacking here: that is no word on the process.
+                # any type, and memory may be lacking here: that says nothing of the process.
                 if not is_late.is_set() and not self._ends(exc):
                     raise
         if is_late.is_set():  # also in the moment of its answer
@@ -397,7 +397,7 @@ class _Process(subprocess.Popen[bytes]):
 
 
 def _end_begun(beginning: Future[_Process]) -> None:
-    """End a process that was started when nobody waited for it any more."""
+    """End a process that was started after its caller had stopped waiting."""
     if not beginning.cancelled() and beginning.exception() is None:
         beginning.result().end()
 

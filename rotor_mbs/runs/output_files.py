@@ -25,7 +25,7 @@ _LARGEST_REPLACED = 1 << 28  # bytes, of an output that is not HDF5
 _OWNER = rb"(process [0-9]+ on [!-~]*)?\Z"
 
 
-# The lock: a file beside an output that no other process may write, which goes afterwards.
+# The lock is a file beside the output, which is removed afterwards.
 
 
 @contextmanager
@@ -77,7 +77,7 @@ def locked(output: Path) -> Iterator[None]:
     except OSError as exc:
         raise StoreError(f"{output}: cannot be written: {exc.strerror}") from exc
     try:
-        # Half-written files of processes that were killed: nobody else writes this output now.
+        # Incomplete files of processes that were killed: no other process writes this output now.
         temporary = re.compile(rf"\.{re.escape(place.name)}\.([0-9]+\.)?tmp")
         for beside in place.parent.iterdir():
             if temporary.fullmatch(beside.name):

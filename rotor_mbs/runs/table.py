@@ -314,7 +314,7 @@ def opened_tables(path: Path, only: Collection[str] | None = None) -> TableFile:
         state = path.stat()
     except OSError:
         return TableFile(path, only)  # says what is wrong
-    # The path as it is given, too: it stands in the tables' messages.
+    # The path as it is given is a part of the key, too: the tables' messages have it.
     stamp = (path, path.absolute(), (state.st_dev, state.st_ino, state.st_size, state.st_mtime_ns))
     with _opening:
         file = _opened.pop(stamp, None)

@@ -48,7 +48,7 @@ atexit.register(_worker.close)
 
 def prepare_reading() -> None:
     """Start the worker process, which loads its code while this one goes on."""
-    with suppress(ResourceError):  # told when a file is read
+    with suppress(ResourceError):  # reported when a file is read
         _worker.start()
 
 

@@ -29,7 +29,7 @@ _CONE = keys.within(keys.NUMBER, at_least=-85.0, at_most=85.0)
 _TABLE = "DISTRIBUTED"  # in the header of BeamDyn's stations
 # Of a matrix of BeamDyn: its six rows, for stiffness, then for mass.
 _MATRIX_ROWS = 6
-# A difference of the node sum from the integral above this is told to the user.
+# A larger difference of the node sum from the integral is reported to the user.
 _SHOWN_DIFFERENCE = 1e-3
 
 

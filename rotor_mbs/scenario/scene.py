@@ -1154,12 +1154,12 @@ def _no_such_entry(container: Any, path: KeyPath, depth: int) -> KeyProblem:
 
 
 def _as_list(tables: Mapping[str, Any], value: Any, path: KeyPath, last: int) -> Any:
-    """Return what stands at a path, as one entry per blade where a file may have one for all.
+    """Return the value at a path, as a list with an entry per blade if a file may have one for all.
 
     Parameters
     ----------
     tables : of the scene file, for the number of blades.
-    value : what stands there; None where the key is missing.
+    value : at the path; None if the key is missing.
     path : of the value.
     last : number of the entry that is to be set.
     """

@@ -611,12 +611,12 @@ def _sweep(
     if design.outputs:
         changes["outputs"] = design.outputs
     if changes:
-        # The scene is changed at once: what is wrong stands at the first of these keys.
+        # All changes are made at once: an error is reported at the first of these keys.
         given = [key for key in ("change", "samples", "outputs") if getattr(design, key)]
         with file.with_line_numbers(given[0]):
             base = base.replace(**changes)
     sweep = Sweep(design, base, file, path)
-    # A problem of many rows is told once; a dict keeps the order.
+    # A problem of many rows is reported once; a dict keeps the order.
     faults: dict[KeyProblem, None] = {}
     for i, variants, row in _rows_to_check(sweep):
         try:

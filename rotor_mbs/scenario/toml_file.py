@@ -20,7 +20,7 @@ from rotor_mbs.errors import InputError, shown_value
 KeyPath = tuple[str | int, ...]
 
 MAX_BYTES = 1 << 20
-# Lines for one file: nobody reads more, and a file of 1 MiB can have 300,000.
+# Largest number of lines for one file: a file of 1 MiB can have 300,000 errors.
 MAX_PROBLEMS = 100
 
 # A dotted key costs the TOML reader the square of its parts in time and memory: 1 MiB of "a.a.a."
@@ -76,11 +76,11 @@ class TableError(InputError):
         super().__init__(fault.message for fault in self.faults)
 
     def under(self, *path: str | int, allowed: str = "") -> list[KeyProblem]:
-        """Return the problems as those of a value that stands somewhere.
+        """Return the problems as those of a value at a path.
 
         Parameters
         ----------
-        *path : where it stands.
+        *path : of the value.
         allowed : what its key allows, for problems that do not say what is allowed.
         """
         faults = []
