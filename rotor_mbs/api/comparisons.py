@@ -53,15 +53,14 @@ def compare(
 
     Parameters
     ----------
-    data : a file, or arrays by name: `time` (n,) s, `angles` and `rates` (n, 1 + blades) rad and
-        rad/s, or single
-        columns such as `rotor`, `pitch_1_deg`; angles or rates may be missing. Loads by name (N, N
-        m), see docs/compare.md. For modes: `speed` (m,) rad/s, `frequencies` (m, modes) rad/s. Also
-        an `xarray.Dataset` or a `pandas.DataFrame` with these names.
+    data : a file, or arrays by name; also an `xarray.Dataset` or a `pandas.DataFrame`. A trajectory
+        has `time` (n,) s, `angles` and `rates` (n, 1 + blades) rad and rad/s, or single columns
+        such as `rotor`, `pitch_1_deg`; angles or rates may be missing. Loads have their names (N,
+        N m), see docs/compare.md. Modes have `speed` (m,) rad/s, `frequencies` (m, modes) rad/s.
     scene : a Scene, the name of a shipped scene, or a TOML file.
     columns : a mapping file, or a mapping with the same keys: column, unit, sign, offset of each
-        channel, and whether
-        it is wrapped. By default columns are identified by name, see `verdict.read`.
+        channel, and whether it is wrapped. By default columns are identified by name, see
+        `verdict.read`.
     tolerance : bound on interval defects beyond rounding of the data (rad); relative bound on loads
         and frequencies.
     timeout : time limit for the reference, the defects and the search for causes (s).

@@ -34,8 +34,8 @@ if TYPE_CHECKING:
 def modes(scene: Scene | str | os.PathLike[str], speeds: Sequence[float] = ()) -> Modes:
     """Compute natural frequencies, damping ratios and mode shapes of a scene.
 
-    They are computed with every model that can be linearized: at rest under gravity, and over
-    `speeds` in steady rotation without gravity (Campbell diagram); with Floquet multipliers in
+    Every model that can be linearized computes the modes at rest under gravity, and over `speeds`
+    in steady rotation without gravity (Campbell diagram). Floquet multipliers are computed in
     rotation under gravity. The scene's torque is not included: a drive torque maintains the speed.
 
     Parameters

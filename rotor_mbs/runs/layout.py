@@ -54,7 +54,7 @@ def create_file(
 ) -> Iterator[TableFile]:
     """Yield a new file with room for all rows of tables, under a temporary name.
 
-    After the block it is complete under its name, or it does not exist. Its space is reserved
+    It gets its name after the block; if the block raises, it is removed. Its space is reserved
     twice: HDF5 does not survive a disk that fills up, and it truncates the file when it begins.
 
     Parameters

@@ -43,8 +43,8 @@ def fit_file_to_request(
     ----------
     path : the results file; of a symbolic link the file that it points to.
     wanted : the tables that are requested.
-    replaced : (group, scene, curve or method) of stored rows that are dropped if `wanted` has not
-        got them.
+    replaced : (group, scene, curve or method) of stored rows that are dropped unless they
+        are in `wanted`.
 
     Returns
     -------
