@@ -296,6 +296,7 @@ class Run(Solution):
         return shown
 
     def __repr__(self) -> str:
+        """Return a summary of the run with its main metrics, as text."""
         known = self._metrics_shown()
         main = [
             f"{name} {known[name]}"
@@ -312,6 +313,7 @@ class Run(Solution):
         return "\n".join([super().__repr__(), *lines])
 
     def _repr_html_(self) -> str:
+        """Return a summary of the run with all metrics and a drawing, for a notebook."""
         drawn = ""
         with suppress(InputError):  # without samples, or without angles and rates
             drawn = self.plot()._repr_svg_()
