@@ -39,6 +39,7 @@ def test_importing_the_package_imports_nothing_else() -> None:
     assert loaded == ["rotor_mbs"]
 
 
+@pytest.mark.full
 def test_every_function_takes_a_scene_by_its_name_or_path(tmp_path: Path) -> None:
     path = tmp_path / "mine.toml"
     shipped = rm.scene("paper/fig03")

@@ -83,6 +83,7 @@ def test_the_readmes_own_scene_is_one() -> None:
     assert scene.has_damping
 
 
+@pytest.mark.full
 def test_the_readmes_python_runs(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """First the API, then what reads a results file."""
     pytest.importorskip("heyoka")

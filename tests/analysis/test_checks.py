@@ -283,6 +283,7 @@ def test_a_reference_is_compared_with_the_shipped_one() -> None:
     assert np.isnan(of_reference(None, shipped)["reference", "all"])
 
 
+@pytest.mark.full
 def test_the_growth_of_a_reference_is_that_of_its_samples() -> None:
     """To the factor by which it was changed; of no other method."""
     exact = solve(REFERENCE, paper("fig03", duration=0.2, samples=5), {})

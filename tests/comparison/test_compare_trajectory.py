@@ -260,6 +260,7 @@ def test_numbers_of_few_digits_are_noticed(run: rm.Run, tmp_path: Path) -> None:
     assert not rm.compare(tmp_path / "low.out", heavier).agrees
 
 
+@pytest.mark.full
 def test_settled_angles_of_few_decimals_are_right_and_have_no_cause() -> None:
     """Of stiff bearings: each has few values, and one rounding error over many rows, which no rest
     angle explains."""
