@@ -20,6 +20,8 @@ class Rotor:
     def __init__(self, scene, settings):
         if not all(blade.has_pitch_inertia for blade in scene.blades):
             raise MethodRefusal("needs inertia about the pitch axes")
+        if scene.has_tilt_or_cone or scene.hub_mass or scene.hub_radius:
+            raise MethodRefusal("knows upright rotors alone")
         self.scene, self.step = scene, settings.step
         self.N = len(scene.blades)
         self.phase = np.array(scene.phases)
