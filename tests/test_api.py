@@ -30,8 +30,8 @@ def test_every_public_name_is_there_and_documented() -> None:
 
 def test_importing_the_package_imports_nothing_else() -> None:
     code = (
-        "import sys; before = set(sys.modules); import rotor_mbs; "
-        "print(*sorted(set(sys.modules) - before))"
+        "import sys; before = set(sys.modules); import rotor_mbs; print(*sorted(set(sys.modules) - "
+        "before))"
     )
     loaded = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True
@@ -158,7 +158,7 @@ def test_what_was_not_asked_for_is_refused_by_name(tmp_path: Path) -> None:
     assert np.isnan([stored.angles, stored.rates, of_sweep.angles, of_sweep.rates]).all()
     for draw in (stored.plot, stored.plot.error, stored.plot.defects, of_sweep.plot.rotor):
         with pytest.raises(
-            rm.InputError, match=("angles are not stored; allowed: angles in `outputs`")
+            rm.InputError, match="angles are not stored; allowed: angles in `outputs`"
         ):
             draw()
     assert "<svg" not in stored._repr_html_() + rm.run(scene, [METHOD])._repr_html_()

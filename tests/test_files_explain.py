@@ -208,7 +208,7 @@ def test_a_file_is_opened_once_and_a_run_reads_its_scene_alone(
     # Another file in its place is seen.
     Path(shutil.copy(files["one"], tmp_path / "other.h5")).replace(path)
     with pytest.raises(
-        rm.StoreError, match=(f"has no {label} any more: another file has taken its place")
+        rm.StoreError, match=f"has no {label} any more: another file has taken its place"
     ):
         _ = runs[label]
 

@@ -59,7 +59,7 @@ def main() -> None:
     looks = (
         Look("#333333", "--", "", "allowed"),
         Look(
-            "#d55e00", "-", "", (f"found: gravity {FAULT:.0e} too large from {FAULT_TIME_S:g} s on")
+            "#d55e00", "-", "", f"found: gravity {FAULT:.0e} too large from {FAULT_TIME_S:g} s on"
         ),
         Look("#0072b2", "-", "", "found: good run"),
     )

@@ -51,8 +51,8 @@ def draw(results: Path) -> None:
         "Rotor angle in Fig. 11: the printed equations depart; corrected ones and Exudyn coincide"
     )
     description = (
-        "Above: rotor angle over time. Below: largest difference of an angle from the "
-        "corrected equations."
+        "Above: rotor angle over time. Below: largest difference of an angle from the corrected "
+        "equations."
     )
     TARGET.write_bytes(canvas.encoded(panels.figure, "svg", title=title, description=description))
 

@@ -236,9 +236,8 @@ def _scene_file() -> str:
     top = {name: key for name, key in SCENE_KEYS.items() if key["key"] != "blade"}
     return page(
         "Scene file",
-        "A TOML file. `a.b` is the key `b` of the table `[a]`. "
-        f"A number may be arithmetic in quotes: {expressions.ALLOWED}; it is parsed, not "
-        "executed as code.",
+        "A TOML file. `a.b` is the key `b` of the table `[a]`. A number may be arithmetic in "
+        f"quotes: {expressions.ALLOWED}; it is parsed, not executed as code.",
         "## Keys",
         _keys(top),
         "## Blades",
@@ -321,13 +320,9 @@ def _bounds() -> str:
         by_check.setdefault(entry["check"], []).append(entry)
     parts = [
         "From `reference/accuracy.toml`. Of the entries that match check, method and scene the "
-        "first one applies; `*` "
-        "matches any text, `|` separates patterns, and an entry without scenes applies to any "
-        "scene. Bounds of "
-        "`defect`, "
-        "`defect median`, `error` and `exact` are in rad; the others are relative, or counts. "
-        "What is compared: "
-        "[check](../check.md)."
+        "first one applies; `*` matches any text, `|` separates patterns, and an entry without "
+        "scenes applies to any scene. Bounds of `defect`, `defect median`, `error` and `exact` are "
+        "in rad; the others are relative, or counts. What is compared: [check](../check.md)."
     ]
     for check, own in by_check.items():
         shown = [name for name in names if name != "check" and any(name in entry for entry in own)]
@@ -362,12 +357,12 @@ _MEANINGS = {
     "ok": "defects, energy balance and error up to the horizon within the bounds",
     "inaccurate": "end reached, but one of these bounds is exceeded",
     "diverged": (
-        "values that are not finite, although the engine reports success; `samples` ends "
-        "before them"
+        "values that are not finite, although the engine reports success; `samples` ends before "
+        "them"
     ),
     "singular": (
-        "the mass matrix is singular at the start or becomes singular; what follows is "
-        "not determined"
+        "the mass matrix is singular at the start or becomes singular; what follows is not "
+        "determined"
     ),
     "solver_failed": "end not reached: the engine reports a failure",
     "timed_out": "end not reached: time limit",
@@ -379,40 +374,32 @@ _MEANINGS = {
 _EXAMPLES = {
     "Results": (
         "`run`, `reproduce` and `reference` write one row per run into `/runs`, and the arrays "
-        "over time into a group "
-        "that has the name of the scene. Both have the same runs: the label in `/runs` is "
-        "`SCENE/METHOD`, that in the "
-        "scene's group `METHOD`.",
+        "over time into a group that has the name of the scene. Both have the same runs: the "
+        "label in `/runs` is `SCENE/METHOD`, that in the scene's group `METHOD`.",
         "run scene.toml -m lagrange/dop853 -m exudyn_chain/extrapolated -o results.h5 -j 1",
     ),
     "Benchmarks": (
         "`bench` writes a row per point (a method with one setting on a scene) into `/bench`, and "
-        "the references into "
-        "`/runs` and the groups of the scenes.",
+        "the references into `/runs` and the groups of the scenes.",
         "bench scene.toml -m lagrange/dop853 --budget 1 --repeats 1 -o bench.h5",
     ),
     "Sweeps": (
         "`sweep` writes one flat table at the root. `run` is a number; each varied parameter is a "
-        "variable. Compared "
-        "with a results file there is no reference and no error relative to one, there are no "
-        "run times, "
-        "`error_growth` and `horizon_s` only with `error_growth = true`, and scene, methods and "
-        "versions are "
-        "attributes instead of columns. `code` distinguishes rows of other versions. "
-        "`rotor_angle_max` is the largest "
-        "magnitude; in a results file it is the largest value, beside `rotor_angle_min`.",
+        "variable. Compared with a results file there is no reference and no error relative to "
+        "one, there are no run times, `error_growth` and `horizon_s` only with `error_growth = "
+        "true`, and scene, methods and versions are attributes instead of columns. `code` "
+        "distinguishes rows of other versions. `rotor_angle_max` is the largest magnitude; in a "
+        "results file it is the largest value, beside `rotor_angle_min`.",
         "sweep study.toml -o sweep.h5 -j 1",
     ),
     "Modes": (
         "`modes` writes a group per scene, model and state (`rest`, `rotation`); Floquet "
-        "multipliers are "
-        "in a group of `lagrange`. All models have the same variables.",
+        "multipliers are in a group of `lagrange`. All models have the same variables.",
         "modes scene.toml --speeds 0.5:1:2 -o modes.h5 -j 1",
     ),
     "Comparisons": (
         "`compare` writes the data, the reference and their differences at the times of the data. "
-        "Shown are the "
-        "variables of one channel of each kind.",
+        "Shown are the variables of one channel of each kind.",
         "compare data.csv --scene scene.toml -o .",
     ),
 }
@@ -454,8 +441,8 @@ _ATTRIBUTES = {
     "label": "label of the model",
     "scene_label": "name of the scene, with what was changed in a shipped one",
     "weights": (
-        "1/s^2, moments of all weights about the shaft divided by the inertia: what "
-        "residuals are relative to"
+        "1/s^2, moments of all weights about the shaft divided by the inertia: what residuals are "
+        "relative to"
     ),
     "symmetric": "1 if the modes are named after multiblade coordinates",
     "mode_labels": "names of the modes",
@@ -479,69 +466,49 @@ def _statuses() -> list[list[object]]:
 def _file_format() -> str:
     parts = [
         "All files are HDF5 and readable as netCDF-4, without links or compression. Numbers are "
-        "little-endian. Every "
-        "dataset has the attributes `units` and `long_name`, and every dimension has a dataset of "
-        "the same name with "
-        "its values (a dimension scale), except `characters`, whose dataset has the length alone. "
-        "The tables list the "
-        "content of files that were written when these pages were built; signs, frames and units "
-        "are explained in "
+        "little-endian. Every dataset has the attributes `units` and `long_name`, and every "
+        "dimension has a dataset of the same name with its values (a dimension scale), except "
+        "`characters`, whose dataset has the length alone. The tables list the content of files "
+        "that were written when these pages were built; signs, frames and units are explained in "
         "[Reading results](../data.md).",
         "**Rows.** A row is complete if its `status` is not -1 and its `crc32` is correct; a file "
-        "is complete if all "
-        "rows are. Of a missing row only the columns that are known in advance (`run`, `scene`, "
-        "`method_name`, "
-        "`settings`, `versions`, `scene_hash`, varied parameters, `split`) are valid; its other "
-        "values are undefined. "
-        "In a complete row a value that does not exist or was not computed is NaN, -1 (integers) "
-        "or an empty text.",
+        "is complete if all rows are. Of a missing row only the columns that are known in advance "
+        "(`run`, `scene`, `method_name`, `settings`, `versions`, `scene_hash`, varied parameters, "
+        "`split`) are valid; its other values are undefined. In a complete row a value that does "
+        "not exist or was not computed is NaN, -1 (integers) or an empty text.",
         "**Arrays over time** have one entry per sample. A run that ended early has `samples` of "
-        "them, and the rest is "
-        "NaN; in a sweep, which has no such column, the entries that are not NaN are those of the "
-        "run. An array that "
-        "the method does not compute is NaN as a whole.",
+        "them, and the rest is NaN; in a sweep, which has no such column, the entries that are "
+        "not NaN are those of the run. An array that the method does not compute is NaN as a "
+        "whole.",
         "**Text** that is known when the file is created is a string of variable length, UTF-8. "
-        "Computed text, such as "
-        "`message`, is an array of single characters (run, characters), UTF-8, padded with zeros; "
-        "xarray reads it as "
-        "text, h5py and MATLAB as [described here](../data.md).",
+        "Computed text, such as `message`, is an array of single characters (run, characters), "
+        "UTF-8, padded with zeros; xarray reads it as text, h5py and MATLAB as [described "
+        "here](../data.md).",
         "**Versions.** The column `versions` is a JSON text with the versions of this package, "
-        "Python, the libraries "
-        "and the code that computed the row. A sweep has the column `code` instead, the CRC-32 of "
-        "that text: among "
-        "rows of one method those of other versions can be told apart, but the versions "
-        "themselves are not stored. "
-        f"The attributes {', '.join(map(code, VERSIONED))} of `/` are of the process that created "
-        "the file. Rows of "
-        "other versions are recomputed by the next `run`, `reproduce`, `bench` or `stability`; a "
-        "sweep keeps them.",
+        "Python, the libraries and the code that computed the row. A sweep has the column `code` "
+        "instead, the CRC-32 of that text: among rows of one method those of other versions can "
+        "be told apart, but the versions themselves are not stored. The attributes "
+        f"{', '.join(map(code, VERSIONED))} of `/` are of the process that created the file. Rows "
+        "of other versions are recomputed by the next `run`, `reproduce`, `bench` or `stability`; "
+        "a sweep keeps them.",
         "**Layout.** Datasets are contiguous, so that a row lies at a fixed offset and is written "
-        "there when it is "
-        "computed. The datasets that are filled in this way are called *computed* here, the "
-        "others *known in advance*. "
-        "The trailer of the file lists them.",
+        "there when it is computed. The datasets that are filled in this way are called "
+        "*computed* here, the others *known in advance*. The trailer of the file lists them.",
         "**Checksum.** `crc32` of row r is the CRC-32 of zlib (`zlib.crc32`), with r, counted "
-        "from 0, as its starting "
-        "value, over the bytes of the row in each computed dataset of `/runs` except `crc32`, in "
-        "the order in which "
-        "they were created (h5py lists them so), then of the method's row in each computed "
-        "dataset of its scene's "
-        "group that has the dimension `run`. For a reference the computed datasets without the "
-        "dimension `run` follow "
-        "as a whole. In `/bench` and `/stability` only the table's own datasets are covered, in a "
-        "sweep those of `/`, "
-        "where the starting value is the number `run`. Datasets known in advance are not covered, "
-        "but by the digest. "
-        "[Reading results](../data.md) has a program for results files.",
+        "from 0, as its starting value, over the bytes of the row in each computed dataset of "
+        "`/runs` except `crc32`, in the order in which they were created (h5py lists them so), "
+        "then of the method's row in each computed dataset of its scene's group that has the "
+        "dimension `run`. For a reference the computed datasets without the dimension `run` "
+        "follow as a whole. In `/bench` and `/stability` only the table's own datasets are "
+        "covered, in a sweep those of `/`, where the starting value is the number `run`. Datasets "
+        "known in advance are not covered, but by the digest. [Reading results](../data.md) has a "
+        "program for results files.",
         "**Trailer.** Behind the end of HDF5, which does not see it: a JSON text, its length (8 "
-        "bytes, little-endian), "
-        "a SHA-256 (32 bytes) and the text `rmbs-end`. The JSON object has `format_version`, "
-        "`kind` (`results`, "
-        "`sweep`, `modes`, `comparison` or `split of FILE`) and `groups`: by group, by name of "
-        "each computed dataset "
-        "in the order of the checksum, offset and length of its values in bytes. The SHA-256 "
-        "covers every byte before "
-        "it except these values. `rotor-mbs` verifies it before it opens a file.",
+        "bytes, little-endian), a SHA-256 (32 bytes) and the text `rmbs-end`. The JSON object has "
+        "`format_version`, `kind` (`results`, `sweep`, `modes`, `comparison` or `split of FILE`) "
+        "and `groups`: by group, by name of each computed dataset in the order of the checksum, "
+        "offset and length of its values in bytes. The SHA-256 covers every byte before it except "
+        "these values. `rotor-mbs` verifies it before it opens a file.",
         "## Status codes",
         (
             "The attributes `flag_values` and `flag_meanings` of every dataset `status` list the "

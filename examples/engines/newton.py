@@ -97,7 +97,7 @@ class Solver:
 
 
 BOUND = Bound(
-    "defect", "featherstone", 3e-3, ("order 1 at its default step: seen 1.1e-3 in 0.02 s of fig11")
+    "defect", "featherstone", 3e-3, "order 1 at its default step: seen 1.1e-3 in 0.02 s of fig11"
 )
 METHOD = Method(
     name="featherstone",

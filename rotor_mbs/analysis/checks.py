@@ -270,7 +270,7 @@ def _changed_metric(run: StoredRun, metrics: Metrics, solution: Solution) -> tup
                 worst, channel, hint = (
                     share,
                     name,
-                    (f"stored {stored:.6g}, its samples give {value:.6g}"),
+                    f"stored {stored:.6g}, its samples give {value:.6g}",
                 )
     return channel, worst, hint
 

@@ -152,7 +152,7 @@ def _results(path: Path) -> FileSummary:
         if results.scenes:
             summary.tables = [_scene_table(results.scenes.values()), method_table(runs)]
             summary.next = [
-                (f"rotor-mbs check {path}", ("accuracy verdicts; exit status 1 where one fails"))
+                (f"rotor-mbs check {path}", "accuracy verdicts; exit status 1 where one fails")
             ]
     if curves:
         summary.scenes = _unique([*summary.scenes, *(curve.scene for curve in curves)])
@@ -207,7 +207,7 @@ def _sweep(path: Path) -> FileSummary:
     if missing:
         summary.statuses["not computed"] = missing
         summary.next = [
-            ("rotor-mbs sweep ...", ("the command that made it computes what is missing"))
+            ("rotor-mbs sweep ...", "the command that made it computes what is missing")
         ]
     if len(sweep.damaged_runs):
         summary.statuses["damaged"] = len(sweep.damaged_runs)
@@ -218,7 +218,7 @@ def _sweep(path: Path) -> FileSummary:
     ]
     summary.tables = [sweep_parameters(sweep)]
     summary.next.append(
-        (f"rotor-mbs check {path}", ("accuracy verdicts; exit status 1 where one fails"))
+        (f"rotor-mbs check {path}", "accuracy verdicts; exit status 1 where one fails")
     )
     return summary
 

@@ -217,8 +217,8 @@ def _status(
             return (
                 "singular",
                 (
-                    "with all pitches at ±π/2 the mass matrix is nearly singular, "
-                    f"{reached}; {reported}"
+                    f"with all pitches at ±π/2 the mass matrix is nearly singular, {reached}; "
+                    f"{reported}"
                 ),
                 "",
             )
@@ -241,7 +241,7 @@ def _status(
         end = reference.time[-1]
         return (
             "singular",
-            (f"the motion ends in a singularity after t = {end:.6g} s; the run continued"),
+            f"the motion ends in a singularity after t = {end:.6g} s; the run continued",
             "",
         )
 
@@ -282,8 +282,8 @@ def _too_far_apart(defects: Defects, count: int) -> str:
     length = float(defects.time[worst + 1] - defects.time[worst])
     apart = f"rows {length:.3g} s apart, between which errors grow {defects.growth[worst]:.1e}-fold"
     return (
-        f"{apart}: in {count} intervals a defect of {OK_ERROR:g} rad would not be seen; "
-        "more samples"
+        f"{apart}: in {count} intervals a defect of {OK_ERROR:g} rad would not be seen; more "
+        "samples"
     )
 
 

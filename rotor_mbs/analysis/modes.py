@@ -731,7 +731,7 @@ def _linear_datasets(linear: LinearModes) -> Datasets:
         "equation": (
             n,
             Column(
-                ("equation",), "1", ("equation of motion, of the coordinate with the same number")
+                ("equation",), "1", "equation of motion, of the coordinate with the same number"
             ),
         ),
         "root": (
@@ -744,16 +744,16 @@ def _linear_datasets(linear: LinearModes) -> Datasets:
         ),
         "undamped_frequency": (
             linear.undamped_frequencies,
-            mode("rad/s", ("undamped frequency, in the rotor's frame")),
+            mode("rad/s", "undamped frequency, in the rotor's frame"),
         ),
         "damped_frequency": (
             linear.damped_frequencies,
-            mode("rad/s", ("damped frequency, in the rotor's frame")),
+            mode("rad/s", "damped frequency, in the rotor's frame"),
         ),
         "damping_ratio": (linear.damping_ratios, mode("1", "damping ratio")),
         "growth_rate": (
             linear.growth_rates,
-            mode("1/s", ("largest real part of the mode's eigenvalues")),
+            mode("1/s", "largest real part of the mode's eigenvalues"),
         ),
         "backward_whirl_frequency": (
             backward,
@@ -775,7 +775,7 @@ def _linear_datasets(linear: LinearModes) -> Datasets:
         ),
         "damping": (
             linear.damping,
-            entry("1/s", ("inverse mass matrix times damping and gyroscopic matrix")),
+            entry("1/s", "inverse mass matrix times damping and gyroscopic matrix"),
         ),
     }
 
@@ -801,23 +801,23 @@ def to_records(modes: SceneModes) -> list[Record]:
             "multiplier_real": (table.multipliers.real, each("1", "Floquet multiplier, real part")),
             "multiplier_imag": (
                 table.multipliers.imag,
-                each("1", ("Floquet multiplier, imaginary part")),
+                each("1", "Floquet multiplier, imaginary part"),
             ),
             "largest_multiplier": (
                 table.largest,
-                at("1", ("largest modulus, without multipliers that are always 1")),
+                at("1", "largest modulus, without multipliers that are always 1"),
             ),
             "growth_rate": (
                 table.growth_rates,
-                at("1/s", ("growth rate that follows from the largest multiplier")),
+                at("1/s", "growth rate that follows from the largest multiplier"),
             ),
             "stable": (
                 table.stable,
-                at("1", ("1: no multiplier above 1, 0: a multiplier above 1, -1: unknown")),
+                at("1", "1: no multiplier above 1, 0: a multiplier above 1, -1: unknown"),
             ),
             "product_error": (
                 table.product_error,
-                at("1", ("logarithm of the product of the multipliers minus the integrated trace")),
+                at("1", "logarithm of the product of the multipliers minus the integrated trace"),
             ),
             "torque": (
                 table.torque,

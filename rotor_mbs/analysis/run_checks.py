@@ -167,7 +167,7 @@ def _checks_of_rows(run: RunSamples, bounds: Bounds) -> Iterator[Check]:
         run.where("time"),
         off,
         "of duration",
-        ("samples are equally spaced, both ends included"),
+        "samples are equally spaced, both ends included",
     )
     if not scene.wants("angles"):
         return
@@ -363,8 +363,7 @@ def _error_fault(run: RunSamples, error: float, what: str) -> str:
         pitch, time = left
         return (
             f"pitch {pitch} leaves zero at t = {time:.3g} s, where symmetry keeps it: rounding, "
-            "which this unstable "
-            f"motion amplifies; {text}"
+            f"which this unstable motion amplifies; {text}"
         )
     if error > _GROWN * metrics.get("defect_max", error):
         text += ", because the motion amplifies small errors"

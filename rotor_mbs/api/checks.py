@@ -61,8 +61,8 @@ class Checks(Sequence[Check]):
 
     def __repr__(self) -> str:
         text = (
-            f"{counted(len(self) - len(self.failures), 'check')} passed, "
-            f"{len(self.failures)} failed"
+            f"{counted(len(self) - len(self.failures), 'check')} passed, {len(self.failures)} "
+            "failed"
         )
         return f"{_table(self.failures)}\n{text}" if self.failures else text
 

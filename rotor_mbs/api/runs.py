@@ -540,8 +540,8 @@ class Runs(Mapping[Any, Any]):
         with open_results(self.path, only=[name]) as results:
             if name not in results.scenes or method not in results.scenes[name].runs:
                 raise StoreError(
-                    f"{self.path}: has no {name}/{method} any more: another file has "
-                    "taken its place"
+                    f"{self.path}: has no {name}/{method} any more: another file has taken its "
+                    "place"
                 )
             scene = results.scenes[name]
             reference = None if method == REFERENCE else scene.reference_trajectory
@@ -681,8 +681,8 @@ class Runs(Mapping[Any, Any]):
                     == math.prod(len(set(of_key)) for of_key in values)
                 ):
                     what = (
-                        f"the {len(data.run)} runs are not every combination of "
-                        f"{', '.join(keys)}, once each"
+                        f"the {len(data.run)} runs are not every combination of {', '.join(keys)}, "
+                        "once each"
                     )
                     raise InputError(f"unstack: {what}; allowed: the sweep of a grid")
                 data = data.set_index(run=keys).unstack("run")

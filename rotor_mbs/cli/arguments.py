@@ -161,7 +161,7 @@ class _Parser(argparse.ArgumentParser):
         self.add_argument("scenes", metavar="SCENE", **{"nargs": "+", "help": text} | options)
 
     def method(
-        self, help: str = ("method (see rotor-mbs list), or a Python file that defines methods")
+        self, help: str = "method (see rotor-mbs list), or a Python file that defines methods"
     ) -> None:
         self.add_argument(
             "-m", "--method", action="append", metavar="METHOD", help=f"{help}; may be repeated"
@@ -169,8 +169,8 @@ class _Parser(argparse.ArgumentParser):
 
     def settings(self) -> None:
         text = (
-            "method setting, ignored by methods without it; may be repeated (see rotor-mbs "
-            "show METHOD)"
+            "method setting, ignored by methods without it; may be repeated (see rotor-mbs show "
+            "METHOD)"
         )
         self.add_argument("--set", action="append", type=setting, metavar="NAME=VALUE", help=text)
 
@@ -254,8 +254,8 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     parser = _Parser(
         prog="rotor-mbs",
         description=(
-            "Simulate wind-turbine rotors with independent models, and compare these with "
-            "each other."
+            "Simulate wind-turbine rotors with independent models, and compare these with each "
+            "other."
         ),
         epilog="start with:\n  rotor-mbs list\n  rotor-mbs show paper/fig11\n  rotor-mbs run "
         "paper/fig11\n"
@@ -308,17 +308,16 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     )  # fmt: skip
     own.add_argument("file", type=file, metavar="FILE", help="a TOML file that does not exist yet")
     text = (
-        "a scene (paper/fig11) or a TOML file to copy, or an OpenFAST model (MODEL.fst) to "
-        "make a scene of"
+        "a scene (paper/fig11) or a TOML file to copy, or an OpenFAST model (MODEL.fst) to make a "
+        "scene of"
     )
     own.add_argument("--from", dest="source", metavar="SOURCE", help=text)
 
     own = command(
         "reproduce",
         (
-            "run every scene of the paper with the default methods and with each erratum "
-            "alone, and "
-            "write the report"
+            "run every scene of the paper with the default methods and with each erratum alone, "
+            "and write the report"
         ),
         "runs:reproduce",
         "",
@@ -334,8 +333,8 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     )  # fmt: skip
     own.scenes()
     own.method(
-        "method (see rotor-mbs list), or a Python file that defines methods (default: "
-        "selected for each scene)"
+        "method (see rotor-mbs list), or a Python file that defines methods (default: selected for "
+        "each scene)"
     )
     own.settings()
     own.output(file, "FILE", Path("results.h5"))
@@ -345,32 +344,30 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     own = command(
         "compare",
         (
-            "compare another program's trajectory, loads or modes with a scene; exit "
-            "status 1 if they differ"
+            "compare another program's trajectory, loads or modes with a scene; exit status 1 if "
+            "they differ"
         ),
         "commands:compare",
         "mine.csv --scene paper/fig11",
-        ("OpenFAST.out --scene my.toml --columns map.toml"),
+        "OpenFAST.out --scene my.toml --columns map.toml",
     )
     text = (
-        "text with a header, .json, .npz, .mat, HDF5, netCDF, an Exudyn sensor file, OpenFAST "
-        ".out or .outb"
+        "text with a header, .json, .npz, .mat, HDF5, netCDF, an Exudyn sensor file, OpenFAST .out "
+        "or .outb"
     )
     own.add_argument("data", type=path, metavar="DATA", help=text)
     own.add_argument(
-        "--scene", required=True, metavar="SCENE", help=("a name (paper/fig05) or a TOML file")
+        "--scene", required=True, metavar="SCENE", help="a name (paper/fig05) or a TOML file"
     )
     text = (
-        "mapping file: column, unit, sign and offset of channels that are not known by name "
-        "(see docs/compare.md)"
+        "mapping file: column, unit, sign and offset of channels that are not known by name (see "
+        "docs/compare.md)"
     )
     own.add_argument("--columns", type=path, metavar="MAP.toml", help=text)
     text = (
         "bound (rad) on interval defects (the equations of motion integrated from each row to the "
-        "next, minus the "
-        "next row) and on errors divided by the error growth; for loads and frequencies a "
-        "relative bound "
-        "(default: %(default)g)"
+        "next, minus the next row) and on errors divided by the error growth; for loads and "
+        "frequencies a relative bound (default: %(default)g)"
     )
     own.add_argument("--tolerance", type=POSITIVE, default=1e-6, metavar="X", help=text)
     text = "time limit for the reference in s (default: %(default)g)"
@@ -378,7 +375,7 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     own.output(folder, "DIR", Path("comparison"), "output folder (default: %(default)s)")
     own.flag("--json", help="print the verdict as JSON")
     own.add_argument(
-        "--names", action=_Names, nargs=0, help=("print the names that columns may have, and end")
+        "--names", action=_Names, nargs=0, help="print the names that columns may have, and end"
     )
 
     own = command(
@@ -420,32 +417,31 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
         nargs="?",
         type=path,
         metavar="FILE",
-        help=("file to check (default: compute a set of runs)"),
+        help="file to check (default: compute a set of runs)",
     )
     own.method("method to compute if no FILE is given, or a Python file that defines methods")
     own.add_argument(
         "--bounds",
         type=path,
         metavar="TOML",
-        help=("bounds that take precedence over reference/accuracy.toml"),
+        help="bounds that take precedence over reference/accuracy.toml",
     )
     text = "fail if a scene of FILE has no run with this method; may be repeated"
     own.add_argument("--require", action="append", metavar="METHOD", help=text)
     text = (
         "also fail if, compared with this earlier file, a margin has shrunk more than tenfold, a "
-        "run is missing or a "
-        "scene was changed"
+        "run is missing or a scene was changed"
     )
     own.add_argument("--against", type=path, metavar="OLD", help=text)
     own.flag(
-        "--allow-changed", help=("tell what changed in scenes since OLD, and do not fail for it")
+        "--allow-changed", help="tell what changed in scenes since OLD, and do not fail for it"
     )
     own.add_argument("--junit", type=file, metavar="XML", help="write the verdicts as JUnit XML")
     own.add_argument(
         "--json",
         type=file,
         metavar="FILE",
-        help=("write the verdicts as JSON; - for standard output"),
+        help="write the verdicts as JSON; - for standard output",
     )
     own.flag("--github", help="print the ten worst failures as annotations")
     own.flag("-v", "--verbose", help="print verdicts that pass, too")
@@ -454,8 +450,8 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     own = command(
         "test-method",
         (
-            "test a method, your own or a built-in one, and report faults with their "
-            "most likely causes"
+            "test a method, your own or a built-in one, and report faults with their most likely "
+            "causes"
         ),
         "verdicts:test_method",
         "./mine.py",
@@ -465,14 +461,14 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
         "methods",
         nargs="+",
         metavar="METHOD",
-        help=("a method (see rotor-mbs list), or a Python file"),
+        help="a method (see rotor-mbs list), or a Python file",
     )
     own.add_argument("--junit", type=file, metavar="XML", help="write the checks as JUnit XML")
     own.add_argument(
         "--json",
         type=file,
         metavar="FILE",
-        help=("write the checks as JSON; - for standard output"),
+        help="write the checks as JSON; - for standard output",
     )
     own.timeout()
 
@@ -484,7 +480,7 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
         "file",
         type=path,
         metavar="SWEEP.toml",
-        help=("a file, or a shipped sweep (sweeps/fig11-spread)"),
+        help="a file, or a shipped sweep (sweeps/fig11-spread)",
     )
     own.method("method to use instead of those in the file")
     own.output(file, "FILE", help="output file (default: name of the sweep with .h5)")
@@ -495,14 +491,14 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
         "--engine",
         default="local",
         metavar="ENGINE",
-        help=("local (default), or dask:tcp://HOST:PORT"),
+        help="local (default), or dask:tcp://HOST:PORT",
     )
     own.add_argument(
         "--part",
         type=part,
         default=(1, 1),
         metavar="K/N",
-        help=("compute part K of N, for a job array"),
+        help="compute part K of N, for a job array",
     )
     own.flag("--fresh", help="recompute all stored runs")
     own.flag("--dry-run", help="only print number of runs and disk space")
@@ -512,7 +508,7 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
 
     own = command(
         "stability",
-        ("run stiff and extreme scenes with every method and report which are stable and accurate"),
+        "run stiff and extreme scenes with every method and report which are stable and accurate",
         "commands:stability",
         "",
         "stiff/bearing-1e8 -o stiff.h5",
@@ -529,8 +525,8 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     own = command(
         "modes",
         (
-            "compute natural frequencies at rest and over rotor speed, and Floquet "
-            "multipliers under gravity"
+            "compute natural frequencies at rest and over rotor speed, and Floquet multipliers "
+            "under gravity"
         ),
         "commands:modes",
         "stiff/nrel-5mw --speeds 0:3:31",
@@ -546,7 +542,7 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     own.jobs()
     own.timeout(
         600.0,
-        text=("time limit per scene in s; the modes of a scene that takes longer are not stored"),
+        text="time limit per scene in s; the modes of a scene that takes longer are not stored",
     )
 
     own = command(
@@ -575,7 +571,7 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
         help="format (default: %(default)s)",
     )
     own.add_argument(
-        "--figure", action="append", metavar="N", help=("only this figure; may be repeated")
+        "--figure", action="append", metavar="N", help="only this figure; may be repeated"
     )
 
     own = command(
@@ -602,7 +598,7 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     own.output(
         file,
         "FILE",
-        help=("output file (default: name of the scene with .xml, -exudyn.py or .csv)"),
+        help="output file (default: name of the scene with .xml, -exudyn.py or .csv)",
     )
 
     return parser, dict(commands.choices)

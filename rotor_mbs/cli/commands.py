@@ -112,8 +112,8 @@ def new(arguments: argparse.Namespace) -> int:
     for new_file in texts:
         if new_file.exists() or new_file.is_symlink():
             raise InputError(
-                f"{new_file}: cannot be created: File exists; allowed: a file that "
-                "does not exist yet"
+                f"{new_file}: cannot be created: File exists; allowed: a file that does not exist "
+                "yet"
             )
     for new_file, text in texts.items():
         try:
@@ -581,7 +581,7 @@ def sweep(arguments: argparse.Namespace) -> int:
             print(f"{result.path}: {counted(result.runs, 'run')}: {by_status}; {computed}")
         if result.older:
             print_line(
-                (f"{result.older} stored runs are from other versions; --fresh recomputes them"),
+                f"{result.older} stored runs are from other versions; --fresh recomputes them",
                 sys.stderr,
             )
         for line in result.lost:

@@ -235,8 +235,8 @@ def line(check: Check) -> str:
     is_told = not check.passed or (check.name == study.CHANGED and check.value > 0.0)
     hint = f"; {check.hint}" if is_told else ""
     return escaped(
-        f"{outcome} {check.name}: {' '.join(check.where)}: {check.value:.2e}, "
-        f"bound {check.bound:.2e}{unit}, margin {margin}{hint}"
+        f"{outcome} {check.name}: {' '.join(check.where)}: {check.value:.2e}, bound "
+        f"{check.bound:.2e}{unit}, margin {margin}{hint}"
     )
 
 

@@ -81,8 +81,8 @@ class MethodFile:
             own = self._named(method)
             if own.name in methods or not _NAME.fullmatch(own.name.rpartition("/")[2]):
                 raise InputError(
-                    f"{self.path}: method {own.name!r}; allowed: names of letters "
-                    "and digits, each once"
+                    f"{self.path}: method {own.name!r}; allowed: names of letters and digits, each "
+                    "once"
                 )
             methods[own.name] = own
         if not methods:
@@ -220,7 +220,7 @@ def read_file(path: str) -> MethodFile:
         file,
         None,
         f"{path}: not loaded within {_LOAD_S:g} s",
-        (f"{path}: ended the process that loaded it"),
+        f"{path}: ended the process that loaded it",
     )
     return file
 

@@ -21,7 +21,7 @@ class Ode45Settings(Settings):
 
     relative_tolerance: float = number(1e-6, above=0.0, doc="relative tolerance of the local error")
     absolute_tolerance: float = number(
-        1e-9, above=0.0, doc=("absolute tolerance of the local error, rad and rad/s")
+        1e-9, above=0.0, doc="absolute tolerance of the local error, rad and rad/s"
     )
 
 

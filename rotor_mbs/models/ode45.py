@@ -175,8 +175,7 @@ def ode45(
             if h <= h_min:
                 message = (
                     f"Failure at t={t:e}. Unable to meet integration tolerances without reducing "
-                    "the step size "
-                    f"below the smallest value allowed ({h_min:e}) at time t."
+                    f"the step size below the smallest value allowed ({h_min:e}) at time t."
                 )
                 break
             # A last step that fails becomes shorter, and no longer reaches the end.

@@ -306,16 +306,16 @@ def caption_of(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> str:
     pictures = panel_runs(figure, scenes)
     what = {
         MOTION: (
-            "(a) Angles (rad) and (b) rates (rad/s) of the rotor and of the pitch of each "
-            "blade over time (s)."
+            "(a) Angles (rad) and (b) rates (rad/s) of the rotor and of the pitch of each blade "
+            "over time (s)."
         ),
         PATHS: (
             "Paths of the blade tips in space; blades at the start (dashed) and at the end "
             "(solid); equal scales."
         ),
         TORQUES: (
-            "(a) Rotor angle (rad) and (b) rotor rate (rad/s) over time (s) for each torque "
-            "on the rotor."
+            "(a) Rotor angle (rad) and (b) rotor rate (rad/s) over time (s) for each torque on the "
+            "rotor."
         ),
     }[figure.kind]
     lines = [f"{title_of(figure, scenes)}.", what]
@@ -351,12 +351,12 @@ def caption_of(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> str:
         what = (
             "the largest distance of a tip (m)"
             if figure.kind == PATHS
-            else ("the largest over all coordinates")
+            else "the largest over all coordinates"
         )
         other = "the corrected model" if PRINTED_SIDE in sides else "the reference"
         text = (
-            f"{DIFFERENCE}: {what}, on a logarithmic axis over time (s), "
-            f"{' and '.join(others)} from {other}."
+            f"{DIFFERENCE}: {what}, on a logarithmic axis over time (s), {' and '.join(others)} "
+            f"from {other}."
         )
         worst = _largest_difference(pictures)
         if INDEPENDENT in sides:
@@ -378,10 +378,9 @@ def _scene_line(label: str, scene: StoredScene) -> str:
     )
     before = f"({label}) " if label else ""
     return (
-        f"{before}{scene.title} (scene {scene.label}): "
-        f"initial angles {angles} rad and rates {rates} rad/s, rotor first; "
-        f"gravity {scene.scene.gravity:g} m/s^2; {scene.scene.duration:g} s, "
-        f"{scene.scene.samples} samples."
+        f"{before}{scene.title} (scene {scene.label}): initial angles {angles} rad and rates "
+        f"{rates} rad/s, rotor first; gravity {scene.scene.gravity:g} m/s^2; "
+        f"{scene.scene.duration:g} s, {scene.scene.samples} samples."
     )
 
 

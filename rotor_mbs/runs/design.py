@@ -110,7 +110,7 @@ _FACTS = {
         "1", "order of convergence of the curve, fitted above its round-off floor", "bench"
     ),
     "step_for_target_s": RowValue(
-        "s", ("largest step of the ladder with an error of at most 1e-6 rad"), "stability"
+        "s", "largest step of the ladder with an error of at most 1e-6 rad", "stability"
     ),
 }
 _LAST = {
@@ -242,11 +242,11 @@ def metric_columns(outputs: Iterable[str]) -> dict[str, Column]:
         if quantity.has_peak:
             columns[f"{name}_max"] = Column(("run",), quantity.units, f"{long_name}: maximum")
             columns[f"{name}_max_time_s"] = Column(
-                ("run",), "s", (f"{long_name}: time of the maximum")
+                ("run",), "s", f"{long_name}: time of the maximum"
             )
             if quantity.dimensions[1:2] == ("blade",):
                 columns[f"{name}_max_blade"] = Column(
-                    ("run",), "1", (f"{long_name}: blade of the maximum, from 1")
+                    ("run",), "1", f"{long_name}: blade of the maximum, from 1"
                 )
     return columns | {"crc32": COLUMNS["crc32"]}
 

@@ -225,8 +225,8 @@ def member(group: Any, name: str) -> Any:
     if not isinstance(link, h5py.HardLink):
         found = "is missing" if link is None else "is a link"
         raise StoreError(
-            f"{group.file.filename}: {group.name}/{name} {found}; allowed: groups "
-            "and arrays of this file"
+            f"{group.file.filename}: {group.name}/{name} {found}; allowed: groups and arrays of "
+            "this file"
         )
     return group[name]
 

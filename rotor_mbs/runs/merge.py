@@ -70,8 +70,8 @@ def fit_file_to_request(
     # A file has one scene of each name: runs of the scene with its earlier numbers cannot stay.
     lost = [
         f"{path}: {row['scene']}: has {row['method_name']} of a scene of that name with other "
-        "numbers, which this call "
-        "would drop; allowed: another output file, or a call that has this method too"
+        "numbers, which this call would drop; allowed: another output file, or a call that has "
+        "this method too"
         for run, row in _known_rows(stored.get(RUNS)).items()
         if hashes.get(row["scene"], row["scene_hash"]) != row["scene_hash"]
         and run not in wanted_runs
@@ -165,8 +165,7 @@ def copy_file(source: Path, target: Path) -> None:
                     if status != MISSING and run not in copied:
                         raise InputError(
                             f"{target}: has {f'{group}: ' if group else 'run '}{run}, which would "
-                            "be lost; allowed: "
-                            "another name, or remove that file"
+                            "be lost; allowed: another name, or remove that file"
                         )
         write_file(target, source.read_bytes())
 

@@ -186,8 +186,8 @@ def refuse_foreign(path: Path, mark: bytes) -> None:
         )
     if not is_own:
         raise InputError(
-            f"{path}: is not an output of this command and is not replaced; allowed: another "
-            "name, or remove that file"
+            f"{path}: is not an output of this command and is not replaced; allowed: another name, "
+            "or remove that file"
         )
 
 

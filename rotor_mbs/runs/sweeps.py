@@ -43,10 +43,10 @@ MESSAGE_LENGTH = 256
 
 COLUMNS_OF_A_RUN = columns_in("sweep") | {
     "rotor_angle_max": Column(
-        ("run",), "rad", ("largest magnitude of the rotor angle over the samples")
+        ("run",), "rad", "largest magnitude of the rotor angle over the samples"
     ),
     "rotor_rate_max": Column(
-        ("run",), "rad/s", ("largest magnitude of the rotor rate over the samples")
+        ("run",), "rad/s", "largest magnitude of the rotor rate over the samples"
     ),
 }
 
@@ -150,8 +150,8 @@ def open_sweep(
         file = TableFile(path, [""])
         if file.attributes.get(IDENTITY) != attributes[IDENTITY]:
             raise InputError(
-                f"{path}: not the file of this sweep; allowed: another output file, "
-                "or remove that one"
+                f"{path}: not the file of this sweep; allowed: another output file, or remove that "
+                "one"
             )
         stored = file.tables[""]
         statuses = stored.statuses()
@@ -217,8 +217,7 @@ class StoredSweep:
             )
             raise StoreError(
                 f"{path}: runs {which} changed after they were written; allowed: the sweep's own "
-                "command, which "
-                "computes them again"
+                "command, which computes them again"
             )
 
     def _check(self) -> None:

@@ -163,8 +163,7 @@ def _checked(path: Path, file: IO[bytes]) -> Trailer:
     if version != FORMAT_VERSION:
         raise StoreError(
             f"{path}: format_version {version!r}, this program reads {FORMAT_VERSION}; allowed: a "
-            "file of this "
-            "version, with its runs recomputed"
+            "file of this version, with its runs recomputed"
         )
     if not isinstance(kind, str) or not _words(kind):
         raise StoreError(
@@ -269,7 +268,7 @@ def _why_without(path: Path, file: IO[bytes], size: int) -> str:
         return "cut off, or another program has written to it (its trailer is not at its end)"
     if b"rotor_mbs" in head and b"format_version" in head:
         return (
-            f"of an earlier format, this program reads format_version {FORMAT_VERSION}; "
-            "allowed: to compute it again"
+            f"of an earlier format, this program reads format_version {FORMAT_VERSION}; allowed: "
+            "to compute it again"
         )
     return "not a file of this program, or damaged; allowed: a file that rotor-mbs wrote"

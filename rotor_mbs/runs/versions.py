@@ -71,7 +71,7 @@ def machine() -> dict[str, str]:
     count = cores()
     return {
         "platform": platform.platform(),
-        "cpu": (f"{processor}, {count} {'core' if count == 1 else 'cores'}"),
+        "cpu": f"{processor}, {count} {'core' if count == 1 else 'cores'}",
     }
 
 

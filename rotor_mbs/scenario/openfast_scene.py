@@ -79,8 +79,8 @@ def scene_text(rotor: OpenFastRotor) -> str:
     lines = [
         *_comment(f"The rotor of the OpenFAST model {rotor.path.name}."),
         *_comment(
-            "SI units, angles in rad; arithmetic in quotes has the model's own numbers."
-            " y is along the shaft, OpenFAST's x (downwind); z up; x is OpenFAST's -y."
+            "SI units, angles in rad; arithmetic in quotes has the model's own numbers. y is along "
+            "the shaft, OpenFAST's x (downwind); z up; x is OpenFAST's -y."
         ),
         *_left_out_comments(rotor),
         "",
@@ -127,17 +127,17 @@ def _blade_lines(blade: BladeModel, rotor: OpenFastRotor) -> list[str]:
     tip_x, tip_y, tip_z = blade.tip
     on_axis = not x and not y
     source = (
-        f"{blade.source[0].upper()}{blade.source[1:]}: {blade.mass:.3f} kg, first moment"
-        f" {blade.first_moment:.3f} kg m, second moment {blade.second_moment:.3f} kg m^2 along the"
-        " blade, about its root."
+        f"{blade.source[0].upper()}{blade.source[1:]}: {blade.mass:.3f} kg, first moment "
+        f"{blade.first_moment:.3f} kg m, second moment {blade.second_moment:.3f} kg m^2 along the "
+        "blade, about its root."
     )
     lines = _comment(source)
     for note in blade.notes:
         lines += _comment(note)
     if on_axis:
         lines += _comment(
-            "The mass is on the pitch axis, as ElastoDyn has it: weight and rotation do not pitch"
-            " the blade. Good for loads and rotor motion, not for a study of the pitch motion."
+            "The mass is on the pitch axis, as ElastoDyn has it: weight and rotation do not pitch "
+            "the blade. Good for loads and rotor motion, not for a study of the pitch motion."
         )
     if on_axis and not blade.inertia[2]:
         lines += _comment("Without an inertia about its axis a pitch is no coordinate: it stays.")
@@ -207,8 +207,8 @@ def _bearing_lines(rotor: OpenFastRotor) -> list[str]:
         stiffness = [f'"{_plain(inertia)}*{rate}**2"' for inertia in inertias]
         damping = [f'"2*{HOLDING_DAMPING:g}*{_plain(inertia)}*{rate}"' for inertia in inertias]
         comments = _comment(
-            "The model prescribes the pitch. This spring keeps it: it is assumed, a pitch inertia"
-            f" at {HOLDING_FREQUENCY:g} Hz with {HOLDING_DAMPING:g} of critical damping."
+            "The model prescribes the pitch. This spring keeps it: it is assumed, a pitch inertia "
+            f"at {HOLDING_FREQUENCY:g} Hz with {HOLDING_DAMPING:g} of critical damping."
         )
     return [
         "[bearing]",

@@ -104,13 +104,12 @@ METRICS = {
     "defect_judged": RowValue(
         "rad",
         "value compared with the bound: defect beyond rounding divided by (interval / 0.01 s), if "
-        "above 1, and by "
-        "the error growth over the interval, if above 1; largest over the run",
+        "above 1, and by the error growth over the interval, if above 1; largest over the run",
         rounding=1.0,
     ),
     "defect_excess": RowValue("rad", "defect beyond rounding in that interval", rounding=1.0),
     "defect_allowed": RowValue(
-        "rad", ("largest defect beyond rounding that is allowed in that interval")
+        "rad", "largest defect beyond rounding that is allowed in that interval"
     ),
     "defect_mean": RowValue(
         "rad", "largest signed mean of the defects of a coordinate", rounding=1.0
@@ -118,29 +117,28 @@ METRICS = {
     "defect_drift": RowValue(
         "rad",
         "largest sum of the defects of 100 consecutive intervals, each multiplied by the state "
-        "transition matrix "
-        "from its interval to the last of the 100",
+        "transition matrix from its interval to the last of the 100",
         rounding=DRIFT_ROWS,
     ),
     "defect_floor": RowValue("rad", "largest defect that rounding of the samples can cause"),
     "defects_not_judged": RowValue(
         "1",
         (
-            "number of intervals with a defect of more than 0.01 rad, beyond rounding or "
-            "because of it"
+            "number of intervals with a defect of more than 0.01 rad, beyond rounding or because "
+            "of it"
         ),
     ),
     "zero_pitch_max": RowValue(
-        "rad", ("largest magnitude of the pitch angles that stay zero in the reference"), _BENCH
+        "rad", "largest magnitude of the pitch angles that stay zero in the reference", _BENCH
     ),
     "zero_pitch_left_s": RowValue(
-        "s", ("time at which a pitch angle that stays zero in the reference becomes nonzero")
+        "s", "time at which a pitch angle that stays zero in the reference becomes nonzero"
     ),
     "zero_pitch_growth_per_s": RowValue(
-        "1/s", ("growth rate of a pitch angle that stays zero in the reference")
+        "1/s", "growth rate of a pitch angle that stays zero in the reference"
     ),
     "rotor_angle_min": RowValue(
-        "rad", (f"smallest rotor angle (signed) over the samples; {_OWN_POINTS}"), is_main=True
+        "rad", f"smallest rotor angle (signed) over the samples; {_OWN_POINTS}", is_main=True
     ),
     "rotor_angle_max": RowValue(
         "rad",

@@ -125,11 +125,11 @@ SCALES = {
     for scale in (
         Quantity("time", ("time",), "s", "time"),
         Quantity(
-            "coordinate", ("coordinate",), "1", ("joint coordinate: 0 rotor, i pitch of blade i")
+            "coordinate", ("coordinate",), "1", "joint coordinate: 0 rotor, i pitch of blade i"
         ),
         Quantity("blade", ("blade",), "1", "blade number, from 1"),
         Quantity(
-            "axis", ("axis",), "1", ("axis: 0 x, 1 y, 2 z of the frame that each variable names")
+            "axis", ("axis",), "1", "axis: 0 x, 1 y, 2 z of the frame that each variable names"
         ),
     )
 }
@@ -253,14 +253,14 @@ LOADS = (
     _load(
         "blade_root_force",
         ("blade", "axis"),
-        ("force of the hub on each blade at its root, in the blade's frame"),
+        "force of the hub on each blade at its root, in the blade's frame",
         "Forces at the blade roots",
         "an acceleration of a centre of mass, or a weight",
     ),
     _load(
         "blade_root_moment",
         ("blade", "axis"),
-        ("moment of the hub on each blade about its root, in the blade's frame"),
+        "moment of the hub on each blade about its root, in the blade's frame",
         "Moments at the blade roots",
         "a lever, a gyroscopic moment, or a weight",
     ),
@@ -274,14 +274,14 @@ LOADS = (
     _load(
         "shaft_moment",
         ("axis",),
-        ("moment of the shaft's bearing on the rotor about the hub centre, in the base frame"),
+        "moment of the shaft's bearing on the rotor about the hub centre, in the base frame",
         "Moment of the shaft's bearing",
-        ("the sum of the moments at the roots, the hub, or the torque"),
+        "the sum of the moments at the roots, the hub, or the torque",
     ),
     _load(
         "pitch_actuator_moment",
         ("blade",),
-        ("moment of each pitch actuator (torque, spring, damper) on its blade"),
+        "moment of each pitch actuator (torque, spring, damper) on its blade",
         "Moments of the pitch actuators",
         "a spring or a damper of a pitch bearing",
     ),
@@ -340,21 +340,21 @@ BUILT_IN = (
         "potential_energy",
         ("time",),
         "J",
-        ("potential energy of gravity (zero at the shaft) and springs"),
+        "potential energy of gravity (zero at the shaft) and springs",
         "energy",
     ),
     Quantity(
         "work",
         ("time",),
         "J",
-        ("work of torques and commands minus the energy dissipated by dampers"),
+        "work of torques and commands minus the energy dissipated by dampers",
         "energy",
     ),
     Quantity(
         "energy_error",
         ("time",),
         "J",
-        ("kinetic plus potential energy minus work, minus its initial value"),
+        "kinetic plus potential energy minus work, minus its initial value",
         "energy",
         producer=lambda _, samples: energy_error(samples),
         plot=Plot(
@@ -378,9 +378,8 @@ BUILT_IN = (
         ("time",),
         "rad",
         (
-            "size of the defect of the interval up to each sample, the largest over angles "
-            "and rates; "
-            "NaN in the first"
+            "size of the defect of the interval up to each sample, the largest over angles and "
+            "rates; NaN in the first"
         ),
         required=False,
     ),
@@ -389,9 +388,8 @@ BUILT_IN = (
         ("time",),
         "rad",
         (
-            "estimate of the error of the angles, before rounding to double precision (half "
-            "a unit in "
-            "the last place)"
+            "estimate of the error of the angles, before rounding to double precision (half a unit "
+            "in the last place)"
         ),
         required=False,
     ),
@@ -399,7 +397,7 @@ BUILT_IN = (
         "error_growth",
         ("time",),
         "1",
-        ("largest factor by which a small error of the initial state has grown"),
+        "largest factor by which a small error of the initial state has grown",
         required=False,
     ),
 )
@@ -451,8 +449,7 @@ def installed(output: str) -> tuple[Quantity, ...]:
     if not points:
         raise InputError(
             f"unknown output {output!r}; allowed: {', '.join(sorted(_OUTPUTS - {''}))}, or the "
-            "name of an entry point "
-            f"in the group {ENTRY_POINT_GROUP}"
+            f"name of an entry point in the group {ENTRY_POINT_GROUP}"
         )
     where = f"output {output!r}, from {points[0].value}"
     try:
@@ -477,8 +474,8 @@ def installed(output: str) -> tuple[Quantity, ...]:
         is_repeated = len(set(dimensions)) < len(dimensions)
         if dimensions[:1] != ("time",) or is_repeated or not set(dimensions[1:]) <= set(allowed):
             faults.append(
-                f"dimensions {dimensions}; allowed: 'time', then any of "
-                f"{', '.join(allowed)}, once each"
+                f"dimensions {dimensions}; allowed: 'time', then any of {', '.join(allowed)}, once "
+                "each"
             )
         if quantity.output != output:
             faults.append(
@@ -523,8 +520,8 @@ def array_of(quantity: Quantity, scene: Scene, samples: Trajectory) -> Array | N
     expected = (len(samples.time), *row_shape(quantity, scene))
     if values.shape != expected:
         raise InputError(
-            f"quantity {quantity.name!r}: its producer gives shape {values.shape}; "
-            f"allowed: {expected}"
+            f"quantity {quantity.name!r}: its producer gives shape {values.shape}; allowed: "
+            f"{expected}"
         )
     return values
 

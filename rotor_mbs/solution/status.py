@@ -81,7 +81,7 @@ def comparison(metrics: Mapping[str, Any], duration: float) -> Comparison:
         error = f"{predicted} predicted"
     horizon = metrics.get("horizon_s")
     compared = (
-        "" if horizon is None or not error else (f"{_seconds(horizon)} of {_seconds(duration)} s")
+        "" if horizon is None or not error else f"{_seconds(horizon)} of {_seconds(duration)} s"
     )
     return Comparison(short_number(defect), of_bound, error, compared)
 

@@ -327,8 +327,7 @@ def regressions(new: Sequence[Check], old: Sequence[Check]) -> list[Check]:
                 value = 0.0
             hint = (
                 f"margin shrank {value:,.0f}-fold (limit {_SHRINK:g}): {check.value:.2e} before, "
-                f"{now.value:.2e} now, "
-                f"bound {now.bound:.2e} {now.unit}; {now.hint}"
+                f"{now.value:.2e} now, bound {now.bound:.2e} {now.unit}; {now.hint}"
             )
         where = check.where._replace(channel=f"{check.name}: {check.where.channel}")
         changes.append(Check(AGAINST, where, value, _SHRINK, hint, "fold"))

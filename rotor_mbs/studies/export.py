@@ -116,8 +116,8 @@ _STEP = 6.7e-4  # s, of the script: the largest time step: the default of exudyn
 _COMMENTS = {  # by kind; parts of another kind are left out
     "node": "joint angles (rad) and rates (rad/s) that move, and their initial values",
     "object": (
-        "hub and blades: kg, m, inertia about centres of mass kg m^2; springs N m/rad, "
-        "dampers N m s/rad"
+        "hub and blades: kg, m, inertia about centres of mass kg m^2; springs N m/rad, dampers N m "
+        "s/rad"
     ),
     "marker": "where a torque acts",
     "load": "torque, N m",

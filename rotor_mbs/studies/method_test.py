@@ -350,8 +350,8 @@ class _Examination:
                     hint = "the motion is right: a stored energy is wrong"
                     if "energies" in worst and worst["energies"].passed:
                         hint = (
-                            "the motion and the energies are right: the work of loads, "
-                            "commands or dampers is wrong"
+                            "the motion and the energies are right: the work of loads, commands or "
+                            "dampers is wrong"
                         )
             elif name in ("energies", "loads", "tip") and not check.value <= bound:
                 hint = _wrong_output(scene, run, check)
@@ -539,7 +539,7 @@ def _wrong_output(scene: Scene, run: Trajectory, check: Check) -> str:
     return (
         f"{channel}: {text}"
         if text
-        else (f"{channel}: not that of its angles and rates; {NOT_FOUND}")
+        else f"{channel}: not that of its angles and rates; {NOT_FOUND}"
     )
 
 

@@ -119,8 +119,8 @@ def modes_of_scenes(
                     status, message = "ok", ""
                     if not end.value.agrees:
                         differ = (
-                            f"models differ by up to {end.value.disagreement:.1e} of the "
-                            "largest eigenvalue"
+                            f"models differ by up to {end.value.disagreement:.1e} of the largest "
+                            "eigenvalue"
                         )
                         status, message = "inaccurate", "; ".join(end.value.faults) or differ
                     outcome = RunOutcome(label, "", status, message, share=share)

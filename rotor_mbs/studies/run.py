@@ -362,7 +362,7 @@ def solve_judged(
         run = replace(
             run,
             status="timed_out",
-            message=("the reference that was asked for is over the time limit"),
+            message="the reference that was asked for is over the time limit",
         )
     return run, reference
 

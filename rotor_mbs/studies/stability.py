@@ -298,7 +298,7 @@ def ladder_curve(scene: Scene, method: str) -> Curve:
     points = []
     for step in steps:
         known = RunRequest(scene, method, {STEP: step}).known | {
-            "run": (f"{scene.name}/{method} step={step:.6g}")
+            "run": f"{scene.name}/{method} step={step:.6g}"
         }
         points.append(Point(method, step, {STEP: step}, known | {STEP: step}))
     return Curve(scene, method, STEP, points, STEPS, TARGET)

@@ -261,7 +261,7 @@ def _side_by_side(chunk: Chunk, scenes: Sequence[Scene]) -> Rows:
             judged = _judged_row(chunk, run)
         except OutOfTimeError as exc:
             judged = chunk.place.encode(
-                {"status": "timed_out", "message": (f"{exc}, while its samples were assessed")}
+                {"status": "timed_out", "message": f"{exc}, while its samples were assessed"}
             )
             judged |= {name: rows[name][i : i + 1] for name in ("energy_drift_max", *_OF_DEFECTS)}
         for name in ("status", "message", "energy_drift_max", *_OF_DEFECTS):

@@ -55,11 +55,9 @@ def test_the_findings_count_the_claims_as_the_shipped_study_does() -> None:
     assert printed["fails"] == 0
     assert (
         f"**Of the paper's {len(study.verdicts)} qualitative claims** {printed['holds']} hold in "
-        "the printed model "
-        f"independently of rounding and duration, and {printed['undecided']} are undecided; in "
-        "the corrected "
-        f"model {corrected['holds']} hold, {corrected['fails']} fail and {corrected['undecided']} "
-        "are undecided"
+        f"the printed model independently of rounding and duration, and {printed['undecided']} are "
+        f"undecided; in the corrected model {corrected['holds']} hold, {corrected['fails']} fail "
+        f"and {corrected['undecided']} are undecided"
     ) in FINDINGS
 
 

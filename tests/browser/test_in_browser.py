@@ -141,20 +141,17 @@ def test_every_plot_is_drawn_text_is_legible_and_tables_fit_their_cards(
             assert count > 0, (path.name, name)
         small = page.run(
             "[...document.querySelectorAll('body *')].filter(e => [...e.childNodes].some(n => "
-            "n.nodeType === 3 &&"
-            "n.textContent.trim()) && e.getClientRects().length && !e.closest('noscript, sub, "
-            "script')).filter(e => {"
-            "const svg = e.closest('svg'), box = svg && (svg.ownerSVGElement ?? svg);"
-            "const view = box?.viewBox.baseVal, scale = view ? box.getBoundingClientRect().width "
-            "/ view.width : 1;"
-            "return parseFloat(getComputedStyle(e).fontSize) * scale < 11.9; }).map(e => "
+            "n.nodeType === 3 &&n.textContent.trim()) && e.getClientRects().length && "
+            "!e.closest('noscript, sub, script')).filter(e => {const svg = e.closest('svg'), box = "
+            "svg && (svg.ownerSVGElement ?? svg);const view = box?.viewBox.baseVal, scale = view ? "
+            "box.getBoundingClientRect().width / view.width : 1;return "
+            "parseFloat(getComputedStyle(e).fontSize) * scale < 11.9; }).map(e => "
             "e.textContent.slice(0, 40))"
         )
         assert small == [], path.name
         wide = page.run(
             "[...document.querySelectorAll('.card .table')].filter(t => t.scrollWidth > "
-            "t.clientWidth + 1).map("
-            "t => t.textContent.slice(0, 60))"
+            "t.clientWidth + 1).map(t => t.textContent.slice(0, 60))"
         )
         assert wide == [], path.name
 
@@ -190,8 +187,7 @@ def test_axe_finds_nothing(
         options = {"runOnly": {"type": "tag", "values": AXE_RULES}, "resultTypes": ["violations"]}
         violations = page.run(
             f"axe.run({json.dumps(options)}).then(r => r.violations.map(v => [v.id, "
-            "v.nodes.length, "
-            "v.nodes[0].target.join(' '), v.nodes[0].failureSummary]))"
+            "v.nodes.length, v.nodes[0].target.join(' '), v.nodes[0].failureSummary]))"
         )
         found += [(path.name, *violation) for violation in violations]
     assert found == []
@@ -367,8 +363,7 @@ def test_the_view_turns_by_dragging(page: Page, report: Path, how: str) -> None:
     still = open_viewer(page, report, 390)
     x, y = page.run(
         "(() => { const b = document.querySelector('.viewer "
-        "canvas').getBoundingClientRect();"
-        "return [b.left + 150, b.top + 120]; })()"
+        "canvas').getBoundingClientRect();return [b.left + 150, b.top + 120]; })()"
     )
     if how == "mouse":
         for kind, way in (("Pressed", 0), ("Moved", 40), ("Moved", 90), ("Released", 90)):
@@ -403,13 +398,13 @@ def test_without_scripts_the_answer_the_tables_and_the_main_plots_are_there(
     assert page.run("document.querySelector('table').offsetHeight") > 20
     assert page.run("document.querySelector('noscript').textContent.includes('JavaScript')")
     stills = page.run(
-        "[...document.querySelectorAll('.still svg')].filter(s => "
-        "s.getBoundingClientRect().height > 100).length"
+        "[...document.querySelectorAll('.still svg')].filter(s => s.getBoundingClientRect().height "
+        "> 100).length"
     )
     assert 1 <= stills <= 6
     empty = (
-        "[...document.querySelectorAll('.card')].filter(c => c.offsetHeight > 0 && "
-        "c.offsetHeight < 30).length"
+        "[...document.querySelectorAll('.card')].filter(c => c.offsetHeight > 0 && c.offsetHeight "
+        "< 30).length"
     )
     assert page.run(empty) == 0
     assert page.run("document.documentElement.scrollWidth") <= 390

@@ -131,10 +131,9 @@ def box_of(page: Page, name: str) -> dict[str, float]:
     page.run(f"{find(name)}.scrollIntoView({{block: 'center'}})")
     found: dict[str, float] = page.run(
         f"(() => {{ const p = {find(name)}, s = p.querySelector('svg'), r = "
-        "s.getBoundingClientRect();"
-        "const [left, , right] = "
-        "s.querySelector('.axis').getAttribute('d').match(/[\\d.]+/g).map(Number).filter("
-        "(_, i) => i !== 1); return {x: r.left, y: r.top, height: r.height, left, right}; })()"
+        "s.getBoundingClientRect();const [left, , right] = "
+        "s.querySelector('.axis').getAttribute('d').match(/[\\d.]+/g).map(Number).filter((_, i) => "
+        "i !== 1); return {x: r.left, y: r.top, height: r.height, left, right}; })()"
     )
     return found
 
@@ -155,10 +154,9 @@ def point(page: Page, name: str, seconds: float, kind: str = "Moved", **more: An
 def read(page: Page, name: str) -> list[str]:
     """The text of the box with the values: heading, then name and value of each curve."""
     found: list[str] = page.run(
-        f"(() => {{ const t = {find(name)}.querySelector('.tip'); return t.hidden ? [] :"
-        "[t.querySelector('b'), ...t.querySelectorAll('td:not(:first-child)')].map(c => "
-        "c.textContent);"
-        "})()"
+        f"(() => {{ const t = {find(name)}.querySelector('.tip'); return t.hidden ? [] "
+        ":[t.querySelector('b'), ...t.querySelectorAll('td:not(:first-child)')].map(c => "
+        "c.textContent);})()"
     )
     return found
 
@@ -203,10 +201,8 @@ def test_the_box_stands_on_the_side_away_from_the_pointer(page: Page, written: P
         point(page, "lines", seconds)
         middle = page.run(
             f"(() => {{ const b = {find('lines')}.getBoundingClientRect(), t = "
-            f"{find('lines')}.querySelector('.tip')"
-            ".getBoundingClientRect(); return [t.left > b.left && t.right < b.right, (t.left + "
-            "t.right) / 2 - b.left,"
-            "b.width]; })()"
+            f"{find('lines')}.querySelector('.tip').getBoundingClientRect(); return [t.left > "
+            "b.left && t.right < b.right, (t.left + t.right) / 2 - b.left,b.width]; })()"
         )
         sides.append(middle)
         assert middle[0], seconds
@@ -370,8 +366,8 @@ def test_text_is_12_px_at_every_width_and_nothing_scrolls_sideways(
     opened(page, written, width)
     sizes = page.run(
         "[...document.querySelectorAll('.plot > svg')].filter(s => s.clientWidth).map(s => "
-        "parseFloat(getComputedStyle(s.querySelector('text')).fontSize) *"
-        "s.getBoundingClientRect().width / s.viewBox.baseVal.width)"
+        "parseFloat(getComputedStyle(s.querySelector('text')).fontSize) "
+        "*s.getBoundingClientRect().width / s.viewBox.baseVal.width)"
     )
     assert min(sizes) == pytest.approx(12.0, abs=0.2)
     assert page.run("document.documentElement.scrollWidth") <= width
@@ -424,9 +420,8 @@ def test_eleven_plots_are_drawn_in_a_moment(page: Page, written: Path) -> None:
     """A redraw of all of them, as every step of a zoom makes: not a second, on a machine in use."""
     opened(page, written)
     spent = page.run(
-        "(() => { const t = performance.now(); document.dispatchEvent(new "
-        "CustomEvent('shown-run', {detail: 0}));"
-        "return performance.now() - t; })()"
+        "(() => { const t = performance.now(); document.dispatchEvent(new CustomEvent('shown-run', "
+        "{detail: 0}));return performance.now() - t; })()"
     )
     assert spent < 1000.0, json.dumps(spent)
 

@@ -68,8 +68,7 @@ def test_methods_that_refuse_a_scene_are_lines_of_run(folder: Path) -> None:
     assert not_run(ended) == [
         f"not run: printed/ode45 on short: {HUB_REASON}",
         "not run: exudyn_tree/rk44 on short: step = 1e-12 requires more than 1e+09 steps for 0.1 "
-        "s; allowed: a step of "
-        "at least 1e-10 s",
+        "s; allowed: a step of at least 1e-10 s",
         "not run: refuses/late on short: has no place for this scene",
     ]
     assert "2 runs computed (2 ok), 0 already stored, 3 not run" in ended.out

@@ -25,7 +25,7 @@ MISTAKES: dict[str, tuple[dict[str, str], str, str]] = {
     "a step too short": (
         {},
         "run {file} -m exudyn_tree/rk67 --set step=1e-300",
-        ("allowed: a step of at least 1e-08 s"),
+        "allowed: a step of at least 1e-08 s",
     ),
     "no tip": ({"tip = [0.08, 0.0, 33.4]": ""}, "run {file}", 'needed for the output "tip"'),
     "a sweep that is run": ({}, "run sweeps/fig11-spread", "rotor-mbs sweep sweeps/fig11-spread"),
@@ -46,7 +46,7 @@ MISTAKES: dict[str, tuple[dict[str, str], str, str]] = {
     "no motion at all": (
         {},
         "run extreme/singular-start",
-        ("singular-start: rejected: all pitches are ±π/2 and"),
+        "singular-start: rejected: all pitches are ±π/2 and",
     ),
     "a motion that ends at once": (
         {},
@@ -61,17 +61,17 @@ MISTAKES: dict[str, tuple[dict[str, str], str, str]] = {
     "a bench without a ladder": (
         {},
         "bench paper/fig09 -m printed/ode45",
-        ("no ladder for method 'printed/ode45'"),
+        "no ladder for method 'printed/ode45'",
     ),
     "a figure that is not there": (
         {},
         "figures {results} --figure 2 -o out",
-        ("figure 2: not in the file; allowed: 8"),
+        "figure 2: not in the file; allowed: 8",
     ),
     "a film of no scene": (
         {},
         "animate a/mine.toml {results} -o a.webp",
-        ("'mine': no such scene in it; allowed: paper/fig08"),
+        "'mine': no such scene in it; allowed: paper/fig08",
     ),
     "a film of another kind": (
         {},
@@ -82,7 +82,7 @@ MISTAKES: dict[str, tuple[dict[str, str], str, str]] = {
     "an engine that is none": (
         {},
         "sweep sweeps/fig11-spread --engine slurm -o s.h5",
-        ("no such engine; allowed: local, or dask:tcp://host:port"),
+        "no such engine; allowed: local, or dask:tcp://host:port",
     ),
 }
 SLIPS: dict[str, tuple[str, str, str]] = {

@@ -61,15 +61,10 @@ def test_list_has_scenes_sweeps_and_methods() -> None:
 def test_list_and_every_help_load_no_library_that_takes_time() -> None:
     """NumPy alone takes as long as all else that `list` does."""
     code = (
-        "import sys\n"
-        "from rotor_mbs.cli import main\n"
-        "from rotor_mbs.cli.arguments import _parser\n"
-        "for words in (['list'], ['--help'], *([name, '--help'] for name in _parser()[1])):\n"
-        "    try:\n"
-        "        main(words)\n"
-        "    except SystemExit:\n"
-        "        pass\n"
-        "print(*sorted({name.partition('.')[0] for name in sys.modules}))\n"
+        "import sys\nfrom rotor_mbs.cli import main\nfrom rotor_mbs.cli.arguments import "
+        "_parser\nfor words in (['list'], ['--help'], *([name, '--help'] for name in "
+        "_parser()[1])):\n    try:\n        main(words)\n    except SystemExit:\n        "
+        "pass\nprint(*sorted({name.partition('.')[0] for name in sys.modules}))\n"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     loaded = set(done.stdout.splitlines()[-1].split())

@@ -153,9 +153,8 @@ MISTAKES: dict[str, tuple[Change, list[str]]] = {
         lambda _, d: {"blade_root_force": d["blade_root_force"][:, :, [1, 0, 2]]},
         [
             (
-                "columns exchanged: blade root force 1 x is blade root force 1 y, blade root "
-                "force 1 y "
-                "is blade root force"
+                "columns exchanged: blade root force 1 x is blade root force 1 y, blade root force "
+                "1 y is blade root force"
             )
         ],
     ),
@@ -165,11 +164,11 @@ MISTAKES: dict[str, tuple[Change, list[str]]] = {
     ),
     "about the centre of mass": (
         about(lambda blade: blade.centre_of_mass),
-        [("about the centre of mass in place of the root")],
+        ["about the centre of mass in place of the root"],
     ),
     "at a hub radius": (
         about(lambda _: (0.0, 0.0, 1.5)),
-        [("about the point (0, 0, 1.5) m of the blade's own frame in place of")],
+        ["about the point (0, 0, 1.5) m of the blade's own frame in place of"],
     ),
     "tower top": (
         lambda _, d: {
@@ -181,7 +180,7 @@ MISTAKES: dict[str, tuple[Change, list[str]]] = {
     "without weight": (without("weight"), [": without the weight"]),
     "without accelerations": (
         without("accelerations"),
-        [(": without the accelerations of rotor and pitches")],
+        [": without the accelerations of rotor and pitches"],
     ),
     "weight alone": (without("inertia"), [": of the weight alone, without inertia forces"]),
     "without pitch": (in_rotor, ["in the rotor frame"]),
@@ -336,7 +335,7 @@ def test_a_mapping_says_column_unit_sign_and_frame_of_a_load() -> None:
     assert "blade root force 2 x, rotor frame" in compared
     assert "blade root force 2 x" not in compared
     with pytest.raises(
-        InputError, match=("shaft_force_x: frame 'blade'; allowed: base, shaft, rotor")
+        InputError, match="shaft_force_x: frame 'blade'; allowed: base, shaft, rotor"
     ):
         rm.compare(
             arrays,

@@ -56,7 +56,7 @@ MISTAKES: dict[str, tuple[str, Callable[[Array, Array], tuple[Array, Array]], st
     "per minute": (
         SPRUNG,
         lambda f, _: (SPEEDS, f * 30.0 / math.pi),
-        ("frequencies in rpm taken as rad/s"),
+        "frequencies in rpm taken as rad/s",
     ),
     "rpm": (UNEQUAL, lambda f, _: (SPEEDS * 30.0 / math.pi, f), "speeds in rpm taken as rad/s"),
     "rpm and Hz": (

@@ -122,12 +122,12 @@ MOTIONS: dict[str, tuple[Callable[[Scene], Scene], str]] = {
     "no tilt": (lambda scene: replace(scene, shaft_tilt=0.0), "without the tilt of the shaft"),
     "tilt": (
         lambda scene: replace(scene, shaft_tilt=-scene.shaft_tilt),
-        ("tilt of the shaft with opposite sign"),
+        "tilt of the shaft with opposite sign",
     ),
     "no cone": (lambda scene: with_cone(scene, 0.0), "without the cone of the blades"),
     "cone": (
         lambda scene: with_cone(scene, math.radians(3.0)),
-        ("cone of the blades with opposite sign"),
+        "cone of the blades with opposite sign",
     ),
     "another tilt": (
         lambda scene: replace(scene, shaft_tilt=math.radians(-6.0)),
@@ -135,7 +135,7 @@ MOTIONS: dict[str, tuple[Callable[[Scene], Scene], str]] = {
     ),
     "another cone": (
         lambda scene: with_cone(scene, math.radians(-2.5)),
-        ("blade.cone off by +0.008727 rad"),
+        "blade.cone off by +0.008727 rad",
     ),
 }
 

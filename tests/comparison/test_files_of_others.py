@@ -230,10 +230,9 @@ def matlab_73(path: Path) -> None:
 
 def solution_of_exudyn(path: Path) -> None:
     head = (
-        "Exudyn explicit time integration (RK67) solver solution file\n"
-        "columns contain: time, ODE2 displacements, ODE2 velocities, ODE2 accelerations\n"
-        "number of written coordinates [nODE2, nVel2, nAcc2, nODE1, nVel1, nAlgebraic, nData] = "
-        "[4,4,4,0,0,0,0]\n"
+        "Exudyn explicit time integration (RK67) solver solution file\ncolumns contain: time, ODE2 "
+        "displacements, ODE2 velocities, ODE2 accelerations\nnumber of written coordinates [nODE2, "
+        "nVel2, nAcc2, nODE1, nVel1, nAlgebraic, nData] = [4,4,4,0,0,0,0]\n"
     )
     rows = np.column_stack([TIME, ANGLES, RATES, 0.0 * RATES])
     np.savetxt(path, rows, delimiter=",", header=head, comments="#", fmt="%.17g")

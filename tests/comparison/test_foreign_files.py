@@ -229,7 +229,7 @@ HEAD = "time [s],rotor [rad]\n"
 WRONG: dict[str, tuple[Callable[[Path], object], str]] = {
     "unknown columns": (
         _write("time,a,b\n0,1,2\n1,2,3\n2,3,4\n"),
-        ("no column for an angle or a rate"),
+        "no column for an angle or a rate",
     ),
     "no time": (_write("rotor,pitch 1\n0,1\n1,2\n2,3\n"), "no column for the time"),
     "other lengths": (_write(HEAD + "0,1\n1,2\n2\n"), "1 fields, where the rows above have 2"),
@@ -239,7 +239,7 @@ WRONG: dict[str, tuple[Callable[[Path], object], str]] = {
     "2 GB": (_sparse, "2.0 GB; allowed: up to 0.5 GB"),
     "wrong unit": (
         _write("time [s],rotor [kg]\n0,1\n1,2\n2,3\n"),
-        ("'kg'; allowed: rad, deg, turns"),
+        "'kg'; allowed: rad, deg, turns",
     ),
     "NaN": (_write(HEAD + "0,1\n1,nan\n2,3\n"), "is nan in row 2 of 3"),
     "repeated time": (_write(HEAD + "0,1\n1,2\n1,3\n"), "the time of row 3, 1 s, repeats"),
@@ -250,7 +250,7 @@ WRONG: dict[str, tuple[Callable[[Path], object], str]] = {
     "too few rows": (_write(HEAD + "0,1\n1,2\n"), "2 rows; allowed: 3 or more"),
     "before the start": (
         _write(HEAD + "-4,1\n-3,2\n-1,3\n"),
-        ("ends at t = -1 s; allowed: times from 0"),
+        "ends at t = -1 s; allowed: times from 0",
     ),
     "a comma between thousands": (
         _write('time [ms],rotor\n0,1\n"1,000",2\n"2,000",3\n'),
@@ -268,7 +268,7 @@ WRONG: dict[str, tuple[Callable[[Path], object], str]] = {
     "JSON of no arrays": (_write('{"time": {"a": 1}}'), "allowed: "),
     "Parquet": (
         lambda path: path.write_bytes(b"PAR1\x15\x04" + bytes(60)),
-        ("not a format that can be read"),
+        "not a format that can be read",
     ),
     "a damaged archive": (lambda path: path.write_bytes(b"PK\x03\x04damaged"), "cannot be read"),
     "a damaged HDF5 file": (
@@ -281,7 +281,7 @@ WRONG: dict[str, tuple[Callable[[Path], object], str]] = {
     ),
     "a program": (
         lambda path: path.write_bytes(b"\x7fELF" + bytes(100)),
-        ("not a format that can be read"),
+        "not a format that can be read",
     ),
 }
 
@@ -301,7 +301,7 @@ def test_wrong_input_is_one_line_and_status_2(tmp_path: Path, case: str) -> None
         ({}, "no columns of numbers"),
         (
             {"time": TIME, "rotor": np.ma.masked_less(ANGLES[:, 0], -1.0)},
-            ("column 'rotor' is nan in row"),
+            "column 'rotor' is nan in row",
         ),
         ({"time": TIME, "angles": [[1.0, 2.0], [3.0]]}, "rows of different lengths"),
         ({"time": TIME[1:], "rotor": ANGLES[:, 0]}, "columns of different lengths"),
@@ -319,20 +319,20 @@ def test_wrong_arrays_are_refused(arrays: Any, message: str) -> None:
     [
         (
             'time = "t"\nrotr = "a"',
-            ("map.toml:2: rotr: unknown key, perhaps rotor; allowed: time, rotor, pitch_1"),
+            "map.toml:2: rotr: unknown key, perhaps rotor; allowed: time, rotor, pitch_1",
         ),
         ('rotor = "c"', "no column 'c'; available: t, a, b"),
         ('rotor = { column = "a", unit = "rpm" }', "'rpm'; allowed: rad, deg, turns"),
         ('rotor = { column = "a", sign = 2 }', "rotor.sign: 2 is out of range; allowed: 1, -1"),
         (
             "rotor = 3",
-            ("rotor: 3 is not a table; allowed: a column's name, or a table with `column`"),
+            "rotor: 3 is not a table; allowed: a column's name, or a table with `column`",
         ),
         ('time = "t"', "no column for an angle or a rate; available: t, a, b"),
         ("omit = []", "says nothing; allowed: time, rotor, pitch_1"),
         (
             'only = ["rotor"]\npitch_1 = "a"',
-            ('pitch_1: is not in `only`; allowed: "pitch_1" in `only`, or no column'),
+            'pitch_1: is not in `only`; allowed: "pitch_1" in `only`, or no column',
         ),
         ('only = ["rotr"]', "is not one of them, perhaps rotor; allowed: a list of rotor"),
         ("rotor", "not TOML"),

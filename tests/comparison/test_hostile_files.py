@@ -168,7 +168,7 @@ CLAIMS: dict[str, tuple[str, Callable[[Path], None], str]] = {
     "mat": (
         "data.mat",
         matlab_array_that_inflates,
-        ("its arrays claim 3.0 GB; allowed: up to 0.5 GB"),
+        "its arrays claim 3.0 GB; allowed: up to 0.5 GB",
     ),
     "hdf5": ("data.h5", dataset_that_inflates, "its arrays claim 8.0 GB; allowed: up to 0.5 GB"),
     "netcdf3": ("data.nc", variable_that_claims_more, ""),  # refused by SciPy, or by its size

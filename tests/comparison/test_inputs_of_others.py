@@ -142,9 +142,8 @@ def matlab(path: Path, run: rm.Run, *, is_struct: bool) -> None:
 
 def solution_of_exudyn(path: Path, run: rm.Run) -> None:
     head = (
-        "Exudyn explicit time integration (RK67) solver solution file\n"
-        "number of written coordinates [nODE2, nVel2, nAcc2, nODE1, nVel1, nAlgebraic, nData] = "
-        "[4,4,4,0,0,0,0]\n"
+        "Exudyn explicit time integration (RK67) solver solution file\nnumber of written "
+        "coordinates [nODE2, nVel2, nAcc2, nODE1, nVel1, nAlgebraic, nData] = [4,4,4,0,0,0,0]\n"
     )
     rows = np.column_stack([run.time, run.angles, run.rates, 0.0 * run.rates])
     np.savetxt(path, rows, delimiter=",", header=head, comments="#", fmt="%.17g")
@@ -201,7 +200,7 @@ CASES = {
     ),
     "null": Case("a.json", null_rate, refusal="column 'pitch 3 rate' is nan in row 1 of 101"),
     "derivatives": Case(
-        "a.csv", derivatives, "inaccurate", likely=("pitch 3 rate: too large by a factor of 1.7")
+        "a.csv", derivatives, "inaccurate", likely="pitch 3 rate: too large by a factor of 1.7"
     ),
     "q from 1": Case("a.csv", lambda p, r: csv(p, named(r, "q[{}]", "qd[{}]", 1))),
     "angles from 1": Case("a.csv", lambda p, r: csv(p, named(r, "angles[{}]", first=1))),
@@ -213,7 +212,7 @@ CASES = {
     "packed, too large": Case(
         "a.nc",
         lambda p, r: packed(p, r, 1e-9),
-        refusal=("has -2147483648, packed from a number that did not fit"),
+        refusal="has -2147483648, packed from a number that did not fit",
     ),
     "missing rows": Case("a.nc", missing_rows, refusal="column 'rotor' is nan in row 99 of 101"),
     "units in arrays": Case("a.h5", units_in_array),
@@ -225,7 +224,7 @@ CASES = {
     "stars": Case(
         "a.txt",
         lambda p, r: fortran(p, r, "*******"),
-        refusal=("row 1 (line 2) has '*******', no number"),
+        refusal="row 1 (line 2) has '*******', no number",
     ),
     "three digits": Case("a.txt", lambda p, r: fortran(p, r, "0.123456-101")),
     "events": Case("a.csv", events_at_ends, note="2 rows are there twice"),
@@ -290,7 +289,7 @@ def motion(run: rm.Run, rows: Any) -> dict[str, Array]:
         (np.arange(101)[::-1], "the rows are from the end to the start: sorted"),
         (
             np.random.default_rng(1).permutation(101),
-            ("the rows are not in the order of their times: sorted"),
+            "the rows are not in the order of their times: sorted",
         ),
     ],
 )
@@ -349,7 +348,7 @@ def test_a_difference_within_the_tolerance_is_told_with_its_cause() -> None:
     compared = rm.compare({"time": time, "angles": angles}, scene)
     assert compared.status == "ok"
     assert compared.likely == (
-        ("without the Coriolis terms (products of rotor rate and pitch rate)"),
+        "without the Coriolis terms (products of rotor rate and pitch rate)",
     )
     assert any(
         "times what the digits of the data explain" in note for note in compared.verdict.notes

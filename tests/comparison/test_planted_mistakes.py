@@ -346,9 +346,8 @@ PLANTS = {
     ),
     "two loads at once": Plant(
         (
-            "wrong or missing from t = 0.7 to 0.8 s: on average +5e+04 N m on the rotor and "
-            "+100 N m "
-            "on the pitch 3"
+            "wrong or missing from t = 0.7 to 0.8 s: on average +5e+04 N m on the rotor and +100 N "
+            "m on the pitch 3"
         ),
         "driven",
         changed=lambda scene: replace(

@@ -166,7 +166,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     vectors = [f"{row['time']},{' '.join(map(repr, row['q']))}" for row in rows]
     write(
         folder / "vectors.csv",
-        "\n".join(["time,q", *vectors, ("This file was closed on 19-Oct-2018.")]),
+        "\n".join(["time,q", *vectors, "This file was closed on 19-Oct-2018."]),
     )
     return folder
 

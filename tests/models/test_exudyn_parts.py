@@ -194,7 +194,7 @@ def test_ctrl_c_inside_a_solve_is_an_interrupt() -> None:
     scene = replace(paper("fig11"), duration=2.0, samples=201)
     with (
         pytest.raises(KeyboardInterrupt),
-        subprocess.Popen(["sh", "-c", (f"sleep 0.5; kill -INT {os.getpid()}")]),
+        subprocess.Popen(["sh", "-c", f"sleep 0.5; kill -INT {os.getpid()}"]),
     ):
         solve(CHAIN, scene, {"step": 1e-4})
 

@@ -76,10 +76,9 @@ def test_without_its_engine_a_method_says_how_to_get_it(
     """And belongs to no default set."""
     arguments = ["run", "paper/fig08", "-m", method, "-o", str(tmp_path / "x.h5")]
     done = python(
-        "from rotor_mbs.cli import main\n"
-        "from rotor_mbs.methods.catalogue import default_methods, find_method\n"
-        f"assert {method!r} not in default_methods() and not find_method({method!r}).is_installed\n"
-        f"sys.exit(main({arguments!r}))",
+        "from rotor_mbs.cli import main\nfrom rotor_mbs.methods.catalogue import default_methods, "
+        f"find_method\nassert {method!r} not in default_methods() and not "
+        f"find_method({method!r}).is_installed\nsys.exit(main({arguments!r}))",
         (engine,),
     )
     assert done.returncode == 2
@@ -104,8 +103,8 @@ def test_exudyn_leaves_the_backend_of_matplotlib_alone(is_imported: bool) -> Non
     """A script, or a notebook, goes on drawing where it drew before a run."""
     before = "import matplotlib; matplotlib.use('svg')\n" if is_imported else ""
     code = (
-        "import rotor_mbs.models.exudyn.adapter\n"
-        "print('matplotlib' in sys.modules and sys.modules['matplotlib'].get_backend())"
+        "import rotor_mbs.models.exudyn.adapter\nprint('matplotlib' in sys.modules and "
+        "sys.modules['matplotlib'].get_backend())"
     )
     done = python(before + code)
     assert done.stdout.strip() == ("svg" if is_imported else "False"), done.stderr

@@ -305,7 +305,7 @@ def test_a_machine_without_room_is_given_up_after_some_tasks_in_a_row() -> None:
     """Thousands of tasks would each be tried alone, a second each."""
     tasks = iter(range(10_000))
     with pytest.raises(
-        ResourceError, match=("stopped after 10 failures in a row: not enough memory, files")
+        ResourceError, match="stopped after 10 failures in a row: not enough memory, files"
     ):
         _ends(_lacks_files, tasks, SerialPool())
     assert next(tasks) < 20

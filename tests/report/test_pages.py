@@ -478,7 +478,7 @@ def test_a_frame_for_each_sample_but_no_more_than_fit_a_page(
 
 
 @pytest.mark.parametrize(
-    ("rate", "noted"), [(4.0, ""), (400.0, ("turns by up to 13 rad from one frame to the next"))]
+    ("rate", "noted"), [(4.0, ""), (400.0, "turns by up to 13 rad from one frame to the next")]
 )
 def test_a_motion_too_fast_for_the_frames_is_stated(
     tmp_path: Path, rate: float, noted: str
@@ -628,11 +628,9 @@ def test_a_report_needs_no_engine_and_no_scipy(results: Path, tmp_path: Path) ->
     modes, sweep = tmp_path / "modes.h5", made_sweep(tmp_path, THREE_RUNS)
     assert rotor_mbs("modes", "paper/fig11", "--speeds", "0.5:1:2", "-o", modes).status == 0
     code = (
-        "import sys\n"
-        "for name in ('exudyn', 'mujoco', 'heyoka', 'scipy'): sys.modules[name] = None\n"
-        "from pathlib import Path\n"
-        "from rotor_mbs.report.build import write_report\n"
-        "for path in map(Path, sys.argv[1:]): write_report(path, Path(path.stem))\n"
+        "import sys\nfor name in ('exudyn', 'mujoco', 'heyoka', 'scipy'): sys.modules[name] = "
+        "None\nfrom pathlib import Path\nfrom rotor_mbs.report.build import write_report\nfor path "
+        "in map(Path, sys.argv[1:]): write_report(path, Path(path.stem))\n"
     )
     subprocess.run([sys.executable, "-c", code, results, modes, sweep], cwd=tmp_path, check=True)
     assert len(list((tmp_path / results.stem).glob("*.html"))) > 4

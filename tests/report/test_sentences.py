@@ -237,8 +237,8 @@ def test_a_run_without_samples_is_said_to_have_none(tmp_path: Path) -> None:
     )
     text = text_of(write_report(path, tmp_path / "out").parent)
     assert answer_of(text) == (
-        "Closed form, Taylor: solver failed: no step was possible. No run of "
-        "this scene has samples."
+        "Closed form, Taylor: solver failed: no step was possible. No run of this scene has "
+        "samples."
     )
     assert 'class="plot"' not in text
 

@@ -223,7 +223,7 @@ TRAILERS = [
     "null",
     "3",
     '{"format_version": 3}',
-    ('{"format_version": 3, "kind": "results", "groups": [1]}'),
+    '{"format_version": 3, "kind": "results", "groups": [1]}',
     '{"format_version": 3, "kind": ["results"], "groups": {}}',
     '{"format_version": 3, "kind": "results", "groups": {"runs": {"status": [-5, 10]}}}',
     '{"format_version": 3, "kind": "results", "groups": {"runs": {"status": ["a", 1e400]}}}',

@@ -226,7 +226,7 @@ def test_a_copy_of_runs_replaces_one_with_the_same_runs(files: Path, tmp_path: P
     results_file(target, [SCENE], ["lagrange/ode45"])
     before = target.read_bytes()
     with pytest.raises(
-        rm.InputError, match=("has runs: check/held/lagrange/ode45, which would be lost")
+        rm.InputError, match="has runs: check/held/lagrange/ode45, which would be lost"
     ):
         runs.save(target)
     assert target.read_bytes() == before

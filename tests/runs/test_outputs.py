@@ -237,7 +237,7 @@ def test_pages_figures_and_saved_runs_replace_no_other_file(tmp_path: Path) -> N
         ("check --junit .", "allowed: a file's name, not a folder"),
         (
             "compare none.csv --scene paper/fig03 -o {sweep}",
-            ("allowed: a folder that can be written"),
+            "allowed: a folder that can be written",
         ),
         ("reproduce -o {sweep}/new", "allowed: a folder that can be written"),
         ("report {results} -o {sweep}", "allowed: a folder that can be written"),

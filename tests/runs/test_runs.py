@@ -90,10 +90,9 @@ def test_names_and_units_keep_the_contract(results: Path) -> None:
         assert {"title", "figures", "blades", "scene_toml", "scene_hash"} <= set(scene.attrs)
         columns = (
             "scene method_name status message settings samples time_reached time_limit_s steps "
-            "rhs_evaluations "
-            "setup_time_s run_time_s run_time_min_s repeats angle_error_max energy_drift_max "
-            "horizon_s rotor_angle_max "
-            "engine_success engine_message versions crc32"
+            "rhs_evaluations setup_time_s run_time_s run_time_min_s repeats angle_error_max "
+            "energy_drift_max horizon_s rotor_angle_max engine_success engine_message versions "
+            "crc32"
         )
         assert set(columns.split()) <= set(runs)
         of_scene = runs["scene"].asstr()[()] == "paper/fig11"

@@ -189,7 +189,7 @@ def test_runs_of_other_numbers_are_not_dropped_without_being_computed_again(tmp_
         1.0,
     )
     with pytest.raises(
-        InputError, match=("has lagrange/taylor of a scene of that name with other numbers")
+        InputError, match="has lagrange/taylor of a scene of that name with other numbers"
     ):
         fit_file_to_request(path, results_tables(_asked("exudyn_tree/rk67", gravity=9.81)))
     assert _runs(path) == ["paper/fig08/lagrange/taylor"]
@@ -246,11 +246,9 @@ def test_a_results_file_opens_in_one_call_and_methods_are_told_by_label(
 
 def test_no_other_process_writes_a_locked_output(path: Path) -> None:
     program = (
-        "import sys, pathlib\n"
-        "from rotor_mbs.runs.output_files import locked\n"
-        "with locked(pathlib.Path(sys.argv[1])):\n"
-        "    print('locked', flush=True)\n"
-        "    sys.stdin.read()\n"
+        "import sys, pathlib\nfrom rotor_mbs.runs.output_files import locked\nwith "
+        "locked(pathlib.Path(sys.argv[1])):\n    print('locked', flush=True)\n    "
+        "sys.stdin.read()\n"
     )
     other = subprocess.Popen(
         [sys.executable, "-c", program, str(path)],

@@ -49,8 +49,8 @@ inertia = 1
 damping = 3
 """
 BLADE = (
-    "[blade]\nmass = 2\ncentre_of_mass = [0.5, 0, 3]\ninertia = [1, 1, 1, 0, 0, 0]\ntip = "
-    "[0.5, 0, 7]\n"
+    "[blade]\nmass = 2\ncentre_of_mass = [0.5, 0, 3]\ninertia = [1, 1, 1, 0, 0, 0]\ntip = [0.5, 0, "
+    "7]\n"
 )
 ON_THE_AXIS = "[blade]\nmass = 2\ncentre_of_mass = [0, 0, 3]\ntip = [0.5, 0, 7]\n"
 
@@ -133,7 +133,7 @@ WRONG = {
         "tilt = 5",
         29,
         r"shaft\.tilt",
-        ("5 is out of range; .*from -pi/2 to pi/2"),
+        "5 is out of range; .*from -pi/2 to pi/2",
     ),
     "cone of a cylinder": (
         "mass = 2",
@@ -189,8 +189,8 @@ def test_a_run_that_cannot_fit_in_memory(tmp_path: Path) -> None:
     text = SCENE.replace("blades = 2", "blades = 20").replace("[0, 0, 0]\n", str([0] * 21) + "\n")
     (problem,) = _problems(tmp_path, text.replace("samples = 11", "samples = 3000000"))
     assert problem.startswith(
-        ":5: samples: 3000000 samples of 103 values of 8 bytes are 2.302 GiB; allowed: at "
-        "most 2 GiB"
+        ":5: samples: 3000000 samples of 103 values of 8 bytes are 2.302 GiB; allowed: at most 2 "
+        "GiB"
     )
 
 

@@ -112,7 +112,7 @@ def _load(folder: Path, text: str) -> Scene:
 
 def test_what_is_optional_is_left_out(tmp_path: Path) -> None:
     scene = _load(
-        tmp_path, SCENE + ("[torque]\nrotor = 0\n[bearing]\nstiffness = 0\ndamping = [0, 0]\n")
+        tmp_path, SCENE + "[torque]\nrotor = 0\n[bearing]\nstiffness = 0\ndamping = [0, 0]\n"
     )
     assert (scene.rotor_torque, scene.bearing_stiffness, scene.bearing_damping) == ((), (), ())
     assert scene.figures == ()

@@ -143,19 +143,19 @@ def test_a_scene_is_no_sweep(tmp_path: Path) -> None:
 
 _BAD = {
     "no rows for training": (
-        ('validation = 0.5\ntest = 0.5\n[[axis]]\nkey = "gravity"\nvalues = [1, 2]'),
+        'validation = 0.5\ntest = 0.5\n[[axis]]\nkey = "gravity"\nvalues = [1, 2]',
         4,
         "test: .*no runs left for training; allowed: a number",
     ),
     "an unknown key of two values, reported once": (
-        ('[[axis]]\nkey = "initial.angels[1]"\nvalues = [1, 2]'),
+        '[[axis]]\nkey = "initial.angels[1]"\nvalues = [1, 2]',
         4,
         r"^[^\n]*: initial\.angels: unknown key[^\n]*$",
     ),
     "no path": (
         '[[axis]]\nkey = "initial..x"\nvalues = [1]',
         4,
-        ("is not the path of a key; allowed"),
+        "is not the path of a key; allowed",
     ),
     "another shape": (
         '[[axis]]\nkey = "blades"\nvalues = [1, 2]',
@@ -174,12 +174,12 @@ _BAD = {
         "reaches 0 or less",
     ),
     "a key twice": (
-        ('[[axis]]\nkey = "gravity"\nvalues = [1]\n[[axis]]\nkey = "gravity"\nvalues = [1]'),
+        '[[axis]]\nkey = "gravity"\nvalues = [1]\n[[axis]]\nkey = "gravity"\nvalues = [1]',
         3,
         "more than one",
     ),
     "a value out of range": (
-        ('[[axis]]\nkey = "blade.mass"\nlinear = {start = 9, end = -9, count = 5}'),
+        '[[axis]]\nkey = "blade.mass"\nlinear = {start = 9, end = -9, count = 5}',
         4,
         "above 0",
     ),

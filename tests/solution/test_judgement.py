@@ -72,14 +72,12 @@ NEAR_BOUND = {"defect_max": 1.0, "defect_excess": 1.0, "defect_judged": 1.0, "de
         (
             NEAR_BOUND | {"defect_excess": 30.0},
             "defect 3.0e+01 rad in the interval up to t = 0.5 s, allowed 6.0e-11 (2e-12 rad per "
-            "0.01 s, times length "
-            "and error growth)",
+            "0.01 s, times length and error growth)",
         ),
         (
             NEAR_BOUND | {"angle_error_predicted": 0.02},
             "defect 1.0e+00 rad in the interval up to t = 0.5 s, allowed 2.0e-12; predicted angle "
-            "error 2.0e-02 rad up "
-            "to 0.2 s",
+            "error 2.0e-02 rad up to 0.2 s",
         ),
         (
             {"angle_error_max": 0.02, "defect_max": 3e-6},
@@ -88,14 +86,13 @@ NEAR_BOUND = {"defect_max": 1.0, "defect_excess": 1.0, "defect_judged": 1.0, "de
         (
             {"angle_error_max": 0.02, "defect_max": 1e-6},
             "angle error 2.0e-02 rad up to the horizon at 0.2 s of 0.2 s, because the motion "
-            "amplifies small errors; "
-            "allowed 0.01 rad",
+            "amplifies small errors; allowed 0.01 rad",
         ),
         (
             {"angle_error_predicted": 0.02, "defect_max": 3e-6},
             (
-                "predicted angle error 2.0e-02 rad up to the horizon at 0.2 s of 0.2 s; "
-                "allowed 0.01 rad"
+                "predicted angle error 2.0e-02 rad up to the horizon at 0.2 s of 0.2 s; allowed "
+                "0.01 rad"
             ),
         ),
     ],

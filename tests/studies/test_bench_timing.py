@@ -240,9 +240,8 @@ def test_the_stored_points_keep_the_contract_and_a_bench_goes_on_where_it_was(
         table = file["bench"]
         columns = (
             "angle_error_max angle_error_end tip_error_max energy_drift_max run_time_s "
-            "run_time_min_s run_time_q1_s "
-            "run_time_q3_s setup_time_s output_time_s repeats steps status step tolerance "
-            "left_out crc32"
+            "run_time_min_s run_time_q1_s run_time_q3_s setup_time_s output_time_s repeats steps "
+            "status step tolerance left_out crc32"
         )
         for name in columns.split():
             assert table[name].dims[0][0].name == "/bench/run", name

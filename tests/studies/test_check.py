@@ -190,7 +190,7 @@ def test_a_changed_byte_is_of_its_run(column: str, bit: int, copy: Path) -> None
     named(
         lines_of(copy, status=1),
         f"FAIL integrity: {SCENE} {METHOD} row",
-        ("changed after it was written"),
+        "changed after it was written",
     )
 
 
@@ -227,7 +227,7 @@ def test_a_model_that_is_not_there_is_missed_where_it_is_required(copy: Path) ->
             lines,
             "FAIL required: check/general",
             method,
-            ("not in the file, which has reference, exudyn_tree/rk67"),
+            "not in the file, which has reference, exudyn_tree/rk67",
         )
 
 
@@ -245,7 +245,7 @@ def test_a_sweep_is_checked_for_methods_and_for_runs_of_an_earlier_file(tmp_path
     named(
         lines_of(new, "--against", old, status=1),
         "FAIL against",
-        ("1 of 3 runs of the earlier file"),
+        "1 of 3 runs of the earlier file",
     )
 
 

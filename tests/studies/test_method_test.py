@@ -103,7 +103,7 @@ BROKEN = {
     "damping ignored": (
         " - self.d * v[1:]",
         "",
-        ("without the dampers of the bearings|damping off by -100 %"),
+        "without the dampers of the bearings|damping off by -100 %",
     ),
     "torque late by a step": (
         "np.array(part.loads_at(t))",
@@ -112,7 +112,7 @@ BROKEN = {
     ),
     "NaN with success": (
         "return Integration(True",
-        ("self.states[-3:] = [np.nan * y] * 3\n        return Integration(True"),
+        "self.states[-3:] = [np.nan * y] * 3\n        return Integration(True",
         "row [0-9]+ is not finite",
     ),
     "no jump handling": (
@@ -128,8 +128,8 @@ BROKEN = {
     "state kept": (
         "        y = self.start()",
         (
-            "        Rk4.runs = getattr(Rk4, 'runs', 0) + 1\n        y = self.start() + 1e-12 "
-            "* Rk4.runs"
+            "        Rk4.runs = getattr(Rk4, 'runs', 0) + 1\n        y = self.start() + 1e-12 * "
+            "Rk4.runs"
         ),
         "state kept between runs",
     ),
@@ -140,11 +140,11 @@ BROKEN = {
     ),
     "angles wrapped": (
         (
-            "return Trajectory(self.time[: len(self.states)], *np.split(np.array(self.states), "
-            "2, axis=1))"
+            "return Trajectory(self.time[: len(self.states)], *np.split(np.array(self.states), 2, "
+            "axis=1))"
         ),
-        "q, v = np.split(np.array(self.states), 2, axis=1)\n"
-        "        return Trajectory(self.time, (q + np.pi) % (2 * np.pi) - np.pi, v)",
+        "q, v = np.split(np.array(self.states), 2, axis=1)\n        return Trajectory(self.time, "
+        "(q + np.pi) % (2 * np.pi) - np.pi, v)",
         "angles are wrapped",
     ),
 }
@@ -355,15 +355,15 @@ def test_loads_that_are_made_wrongly_are_named() -> None:
     for changed, expected in (
         (
             {"blade_root_force": -force},
-            ("blade root force: sign reversed (action in place of reaction)"),
+            "blade root force: sign reversed (action in place of reaction)",
         ),
         (
             {"blade_root_force": np.roll(force, -1, axis=1)},
-            ("blade root force: of the next blade for each blade"),
+            "blade root force: of the next blade for each blade",
         ),
         (
             {"blade_root_moment": about_centre},
-            ("blade root moment: about the centre of mass in place of the root"),
+            "blade root moment: about the centre of mass in place of the root",
         ),
         ({"shaft_force": 1e-3 * loads["shaft_force"]}, "shaft force: kN taken as N"),
         ({"shaft_force": loads["shaft_force"] + run.time[:, None]}, ""),
@@ -394,8 +394,8 @@ def test_a_motion_that_falls_behind_in_many_intervals_is_late() -> None:
     defects = interval_defects(scene, time, *motion)
     (text,) = faults_in_time(judged_defects(scene, defects, 1e-6))
     assert text == (
-        "the motion is late by 0.001 s more in each of 10 intervals from t = 0 to 0.56 "
-        "s: steps, or times"
+        "the motion is late by 0.001 s more in each of 10 intervals from t = 0 to 0.56 s: steps, "
+        "or times"
     )
 
 
@@ -423,7 +423,7 @@ OTHERS: dict[str, tuple[Any, Mistakes, str]] = {
     "Steiner twice": (
         {"blades": changed_blades(FIVE, 2.0)},
         other_code.NONE,
-        ("inertia about the root used"),
+        "inertia about the root used",
     ),
     "half": ({}, Mistakes(coriolis=0.5), "half of the Coriolis terms"),
     "azimuths": (

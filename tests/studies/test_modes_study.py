@@ -291,8 +291,8 @@ def test_no_steady_state_is_one_line_and_no_file(tmp_path):
     (tmp_path / "free.toml").write_text(scene.text, encoding="utf-8")
     output = tmp_path / "modes.h5"
     reason = (
-        "no steady state at 0 rad/s: a torque of 500 N m acts on pitch 1, which has no "
-        "spring, and nothing"
+        "no steady state at 0 rad/s: a torque of 500 N m acts on pitch 1, which has no spring, and "
+        "nothing"
     )
     shown = rotor_mbs("modes", "-o", output, "-j", 1, tmp_path / "free.toml", "--speeds=0:0.001:2")
     assert shown == (2, "", f"not run: free: {reason} balances it\n")

@@ -65,7 +65,7 @@ EXPLAINED = {
     (
         r"(samples\.loads_at(_start)?|kinematics\.(work_of_constant_loads|exact_rotor_angle)) "
         r".*0\.0 -> "
-    ): ("a constant load is the same at any time"),
+    ): "a constant load is the same at any time",
     r"taylor\.items .*turned round": (
         "seen in test_independence.py, whose processes have no mutants"
     ),
@@ -73,7 +73,7 @@ EXPLAINED = {
     (
         r"taylor\.(_UNROLLED_BLADES|compiled|is_compact) |adapter\.(_settings "
         r".*|)(constraints|_OLD_JACOBIAN_FROM)"
-    ): ("decides how long a run takes, not what comes out"),
+    ): "decides how long a run takes, not what comes out",
     r"checks\._of_reference .* 0 -> 1": (
         "compared by its length: no shipped reference has a single sample"
     ),
@@ -95,8 +95,8 @@ EXPLAINED = {
     # Not the original, and not seen all the same: tolerances, first steps and counts that are not
     # judged.
     r"sensor_samples\.work .*(1e-09 \* scene\.duration|scene\.samples - 1|slack scaled)": (
-        "a tolerance in matching times: any between round-off and the distance of two rows "
-        "does as well"
+        "a tolerance in matching times: any between round-off and the distance of two rows does as "
+        "well"
     ),
     r"time_table\.values_before .*1e-12 scaled": (
         "keeps rounding from passing a jump: any size near it does"
@@ -111,7 +111,7 @@ EXPLAINED = {
     (
         r"schemes\.(scheme|newton_relative_tolerance) .*(_NEWTON_SHARE .* scaled|1e-10 -> |40 -> "
         r"|2\.0 -> )"
-    ): ("where Newton's method stops, below what is kept, and when it begins anew"),
+    ): "where Newton's method stops, below what is kept, and when it begins anew",
     r"schemes\.scheme .* 0 -> 1$": (
         "extrapolation takes the implicit solver whatever the scheme's stages are"
     ),
@@ -130,8 +130,8 @@ EXPLAINED = {
         "the engine cuts a first step that is longer than its interval, with another rounding"
     ),
     r"adapter\.(linearized|initial_values) .*(1\.0 -> |0\.01 \* 0\.5|3 -> 4)": (
-        "the size of a difference quotient's step, and how many are extrapolated: any near it "
-        "does as well"
+        "the size of a difference quotient's step, and how many are extrapolated: any near it does "
+        "as well"
     ),
     r"solvers\.(__init__|integrate) .*0 -> 1": (
         "parts of the first interval; how small the smallest may be"

@@ -45,8 +45,8 @@ def test_a_worker_does_not_grow(tmp_path: Path, method: str, samples: int, durat
             pool.submit(Chunk.perform, chunk, 60.0).result()
         after = pool.submit(_resident, None, 60.0).result()
     print(
-        f"\n{method}, {samples} samples: {before:.1f} MB after 1,000 runs, {after:.1f} MB "
-        "after 11,000"
+        f"\n{method}, {samples} samples: {before:.1f} MB after 1,000 runs, {after:.1f} MB after "
+        "11,000"
     )
     assert after - before < 20.0
 

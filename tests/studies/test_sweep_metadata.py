@@ -97,7 +97,7 @@ def test_a_dataset_card_replaces_its_own_kind_only(dataset: Path, tmp_path: Path
     assert [file.name for file in files] == ["train.h5", "validation.h5", "test.h5"]
     assert all(f"path: {file.name}" in text for file in files)
     with pytest.raises(
-        StoreError, match=(f"a split for .*; allowed: the sweep's own file, {dataset.name}")
+        StoreError, match=f"a split for .*; allowed: the sweep's own file, {dataset.name}"
     ):
         StoredSweep(files[0])
     assert "a split for Hugging Face datasets; allowed: the sweep's own file" in refusal(

@@ -35,8 +35,7 @@ NOT_FOUND = "cause not found"
 # Not of the mistake itself, but of what it does to another check.
 _CONSEQUENCE = (
     "see the defect|the motion is right: a stored energy is wrong|measured order|solved "
-    "analytically|"
-    "does not give that of the motion|by other numbers give another motion"
+    "analytically|does not give that of the motion|by other numbers give another motion"
 )
 
 
@@ -100,8 +99,8 @@ _ORDERED = "order (1|0|2|3)[.0-9]* where"
 _LOAD = "a load of one interval|a load that is wrong|loads? of another time"
 _OBSERVED = (
     "return Trajectory(self.time[: len(self.states)], *np.split(np.array(self.states), 2, axis=1))",
-    "q, v = np.split(np.array(self.states), 2, axis=1)\n"
-    "        return Trajectory(self.time[: len(q)], q, np.vstack([v[:1], v[:-1]]))",
+    "q, v = np.split(np.array(self.states), 2, axis=1)\n        return Trajectory(self.time[: "
+    "len(q)], q, np.vstack([v[:1], v[:-1]]))",
 )
 
 PHYSICS = {
@@ -119,12 +118,12 @@ PHYSICS = {
     "p03_phase_degrees": Engine(
         "azimuths taken as degrees",
         [(_PHASES, "np.radians(scene.phases)")],
-        ("azimuths .* taken as degrees"),
+        "azimuths .* taken as degrees",
     ),
     "p04_damping_twice": Engine(
         "pitch dampers twice",
         [(_LAW, "f[1:] = act - self.d * v - n[:, 2]")],
-        ("twice the dampers of the bearings"),
+        "twice the dampers of the bearings",
     ),
     "p05_no_shaft_damping": Engine(
         "no shaft damper",
@@ -167,7 +166,7 @@ PHYSICS = {
     "p12_phase_direction": Engine(
         "azimuths against the rotation",
         [(_PHASES, "-np.array(scene.phases)")],
-        ("numbered in the opposite sense"),
+        "numbered in the opposite sense",
     ),
     "p13_coupling_sign": Engine(
         "coupling in the mass matrix reversed", [("= Ja[i, 2]", "= -Ja[i, 2]")]
@@ -205,7 +204,7 @@ PHYSICS = {
         [
             (
                 "inertia + np.sum(a * Ja)",
-                ("inertia + np.sum(a * Ja) + np.sum(self.m * self.r[:, 2] ** 2)"),
+                "inertia + np.sum(a * Ja) + np.sum(self.m * self.r[:, 2] ** 2)",
             )
         ],
     ),
@@ -232,11 +231,9 @@ NUMERICS = {
         [
             (
                 "        angles, rates = rows",
-                "        some = np.unique(np.append(np.arange(0, len(rows), 5), len(rows) - 1))\n"
-                "        rows = np.stack([np.interp(time, time[some], column[some]) for column in "
-                "rows.T], axis=1)\n"
-                "        kept = {}\n"
-                "        angles, rates = rows",
+                "        some = np.unique(np.append(np.arange(0, len(rows), 5), len(rows) - 1))\n "
+                "       rows = np.stack([np.interp(time, time[some], column[some]) for column in "
+                "rows.T], axis=1)\n        kept = {}\n        angles, rates = rows",
             )
         ],
         "linear interpolation",
@@ -258,7 +255,7 @@ NUMERICS = {
             *_SETTINGS,
             (
                 _ADVANCE,
-                ("        return solve_ivp(self.dynamics, (a, b), y, args=(part,)).y[:, -1]\n\n"),
+                "        return solve_ivp(self.dynamics, (a, b), y, args=(part,)).y[:, -1]\n\n",
             ),
             (", " + _ORDER, ""),
         ],
@@ -273,8 +270,7 @@ NUMERICS = {
             (
                 (
                     "            if part.end - t > tiny:\n                y = self.advance(t, "
-                    "part.end, "
-                    "y, part)\n"
+                    "part.end, y, part)\n"
                 ),
                 "",
             ),
@@ -304,8 +300,8 @@ ROWS = {
         [
             (
                 "for n, part in enumerate(parts):\n",
-                "for n, part in enumerate(parts):\n"
-                "            if len(self.rows) > 0.9 * len(self.time):\n                break\n",
+                "for n, part in enumerate(parts):\n            if len(self.rows) > 0.9 * "
+                "len(self.time):\n                break\n",
             ),
             ("while i < len(self.time) and", "while i < 0.9 * len(self.time) and"),
         ],
@@ -326,7 +322,7 @@ ROWS = {
         [
             (
                 '"blade_root_force"].append(force)',
-                ('"blade_root_force"].append(self.to_base(turn, th, force))'),
+                '"blade_root_force"].append(self.to_base(turn, th, force))',
             )
         ],
         "blade root force: in the base frame",
@@ -365,8 +361,8 @@ ROWS = {
         [
             (
                 _RATES,
-                "rows[:, : N + 1], rows[:, N + 1 : 2 * N + 2].copy()\n"
-                "        rates[1:] = np.diff(angles, axis=0) / self.time[1]\n",
+                "rows[:, : N + 1], rows[:, N + 1 : 2 * N + 2].copy()\n        rates[1:] = "
+                "np.diff(angles, axis=0) / self.time[1]\n",
             )
         ],
         "backward differences",
@@ -381,8 +377,8 @@ ROWS = {
         [
             (
                 "return Trajectory(time, angles, rates, **kept)",
-                "order = [0, *range(N, 0, -1)]\n"
-                "        return Trajectory(time, angles[:, order], rates[:, order], **kept)",
+                "order = [0, *range(N, 0, -1)]\n        return Trajectory(time, angles[:, order], "
+                "rates[:, order], **kept)",
             )
         ],
         # Where the pitches move alike, their moments tell the order.
@@ -421,7 +417,7 @@ GIVEN = {
         [
             (
                 "        self.J += np",
-                ("        self.J = (2 * np.eye(3) - 1) * self.J\n        self.J += np"),
+                "        self.J = (2 * np.eye(3) - 1) * self.J\n        self.J += np",
             )
         ],
         "products of inertia with opposite sign",
@@ -464,7 +460,7 @@ GIVEN = {
     "b13_work_without_damping": Engine(
         "work without the bearings' dampers",
         [("torque * v - self.d * v**2", "torque * v")],
-        ("the work of loads, commands or dampers is wrong"),
+        "the work of loads, commands or dampers is wrong",
     ),
     "b14_stale_load_jump": Engine(
         "loads stale after a jump",
@@ -482,7 +478,7 @@ RIGHT = {
             ("number(1e-3", "number(1e-4"),
             (
                 "import numpy as np\n",
-                ("import numpy as np\nfrom rotor_mbs.scenario.accuracy_bounds import Bound\n"),
+                "import numpy as np\nfrom rotor_mbs.scenario.accuracy_bounds import Bound\n",
             ),
             (
                 _ORDER,
@@ -497,8 +493,8 @@ RIGHT = {
             (
                 _STEP,
                 (
-                    "        k1 = f(t, y, part)\n        return y + h / 2 * (k1 + f(t + h, y + h "
-                    "* k1, part))\n\n"
+                    "        k1 = f(t, y, part)\n        return y + h / 2 * (k1 + f(t + h, y + h * "
+                    "k1, part))\n\n"
                 ),
             ),
             ("number(1e-3", "number(1e-4"),
@@ -633,9 +629,8 @@ def table(folder: Path) -> str:
         broken.append(f"| {name} | {engine.mistake} | {scenes} | {verdict} | {cause} | {word} |")
     lines = [
         (
-            f"{len(broken)} broken engines: {sum('PASSES' in line for line in broken)} "
-            f"pass, {named} "
-            "have the right cause,"
+            f"{len(broken)} broken engines: {sum('PASSES' in line for line in broken)} pass, "
+            f"{named} have the right cause,"
         ),
         f"{wrong} a wrong one, {len(broken) - named - wrong} none.",
         "",
@@ -657,10 +652,10 @@ def main() -> None:
     parser.add_argument("folder", type=Path)
     parser.add_argument("-o", "--output", type=Path, help="the document, whose tables are replaced")
     parser.add_argument(
-        "--first", action="store_true", help=("by the first scene alone, in this process")
+        "--first", action="store_true", help="by the first scene alone, in this process"
     )
     parser.add_argument(
-        "--engines", default=",".join(ENGINES), help=("names, separated by commas; '' for none")
+        "--engines", default=",".join(ENGINES), help="names, separated by commas; '' for none"
     )
     arguments = parser.parse_args()
     arguments.folder.mkdir(exist_ok=True)

@@ -55,12 +55,9 @@ SURE = 0.95
 DECIDING = 0.5  # share of the runs that must decide
 RULE = (
     f"A claim holds if it is true in at least {100 * SURE:.0f} % of the deciding runs for every "
-    "duration, fails if it "
-    f"is true in at most {100 * (1 - SURE):.0f} % for every duration, and is undecided otherwise, "
-    "or if fewer than "
-    f"{100 * DECIDING:.0f} % of the runs are deciding. A run that ended early, or whose energy "
-    "rose by a thousand "
-    "times the energy scale, is not deciding."
+    f"duration, fails if it is true in at most {100 * (1 - SURE):.0f} % for every duration, and is "
+    f"undecided otherwise, or if fewer than {100 * DECIDING:.0f} % of the runs are deciding. A run "
+    "that ended early, or whose energy rose by a thousand times the energy scale, is not deciding."
 )
 Row = dict[str, Any]  # of a table of claim_runs.json
 

@@ -111,7 +111,7 @@ def write_output(
         ),
         " linked with NWTC Subroutine Library; ElastoDyn",
         "",
-        ("Description from the FAST input file: rigid"),
+        "Description from the FAST input file: rigid",
         "",
         "\t".join(chosen),
         "\t".join(f"({columns[name][0]})" for name in chosen),

@@ -153,7 +153,7 @@ def main() -> None:
     parser.add_argument("--seeds", default="0:200", help="first:end")
     parser.add_argument("--limit", type=float, default=LIMIT_S, help="s, of each run")
     parser.add_argument(
-        "--cpu", type=float, default=600.0, help=("s, of the independent integration")
+        "--cpu", type=float, default=600.0, help="s, of the independent integration"
     )
     arguments = parser.parse_args()
     first, end = map(int, arguments.seeds.split(":"))

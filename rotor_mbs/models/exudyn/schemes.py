@@ -86,13 +86,13 @@ class Dopri5Settings(Settings):
     """
 
     relative_tolerance: float = number(
-        0.0, at_least=0.0, doc=("relative tolerance of the local error")
+        0.0, at_least=0.0, doc="relative tolerance of the local error"
     )
     absolute_tolerance: float = number(
-        1e-11, above=0.0, doc=("absolute tolerance of the local error, rad and rad/s")
+        1e-11, above=0.0, doc="absolute tolerance of the local error, rad and rad/s"
     )
     trial_steps: int = number(
-        10_000, at_least=1, doc=("largest number of trial steps between two samples")
+        10_000, at_least=1, doc="largest number of trial steps between two samples"
     )
 
     def scheme(self) -> Scheme:
@@ -114,10 +114,10 @@ class NewtonSettings(Settings):
 
     step: float = step(2.5e-4)
     newton_relative_tolerance: float = number(
-        1e-8, above=0.0, doc=("relative tolerance of Newton's residual")
+        1e-8, above=0.0, doc="relative tolerance of Newton's residual"
     )
     newton_absolute_tolerance: float = number(
-        1e-10, above=0.0, doc=("absolute tolerance of Newton's residual")
+        1e-10, above=0.0, doc="absolute tolerance of Newton's residual"
     )
 
     def scheme(self) -> Scheme:
@@ -142,7 +142,7 @@ class AlphaSettings(NewtonSettings):
     """Generalized-alpha, constraints at position level (index 3), order 2."""
 
     spectral_radius: float = number(
-        0.9, at_least=0.0, at_most=1.0, doc=("1: no numerical damping, 0: largest")
+        0.9, at_least=0.0, at_most=1.0, doc="1: no numerical damping, 0: largest"
     )
 
     def scheme(self) -> Scheme:
@@ -153,7 +153,7 @@ class AlphaSettings(NewtonSettings):
 _NODE = choice(
     "euler_parameters",
     ("euler_parameters", "rotation_vector"),
-    doc=("coordinates of a body's rotation"),
+    doc="coordinates of a body's rotation",
 )
 
 
@@ -188,7 +188,7 @@ class ExtrapolatedSettings(Settings):
         above=0.0,
         at_most=1e-2,
         unit="rad",
-        doc=("tolerance for the estimated error of each interval"),
+        doc="tolerance for the estimated error of each interval",
     )
 
     @property

@@ -232,8 +232,8 @@ class ExtrapolatedSolver:
                 self._keep(end, interval, self._consistent(state), self.system.turns(), work)
                 return ""
         return (
-            f"near t = {start:.6g} s the error of an interval of {end - start:.3g} s remains "
-            "above the tolerance"
+            f"near t = {start:.6g} s the error of an interval of {end - start:.3g} s remains above "
+            "the tolerance"
         )
 
     def _work(self, interval: Interval) -> float:
@@ -417,8 +417,7 @@ def build_chain(scene: Scene, settings: ChainSettings) -> Solver:
     if scene.wants("loads") and settings.node == "rotation_vector":
         raise MethodRefusal(
             "exudyn_chain: loads need the setting node = euler_parameters: with rotation_vector "
-            "the engine's "
-            "first multipliers are wrong, and those of newmark_index2 remain wrong"
+            "the engine's first multipliers are wrong, and those of newmark_index2 remain wrong"
         )
     loads = Loads(scene)
     parts = chain.parts(scene, loads, settings.node)

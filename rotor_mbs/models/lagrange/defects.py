@@ -263,8 +263,8 @@ def fitted_rates(scene: Scene, time: Array, angles: Array) -> FittedRates:
         residual = np.concatenate([offset[:, :half] for offset in offsets], axis=1)
         if not (np.isfinite(design).all() and np.isfinite(residual).all()):
             raise InputError(
-                "the rates cannot be computed from the angles: errors grow without "
-                "bound between the rows"
+                "the rates cannot be computed from the angles: errors grow without bound between "
+                "the rows"
             )
         inverse = np.linalg.pinv(design)
         at_first = -np.einsum("kij,kj->ki", inverse, residual) * scale

@@ -283,8 +283,7 @@ def _refuse_large_torques(scene: Scene, form: RotorForm, speed: float, loads: Lo
                 balance = f"gravity and rotation balance at most {largest:g} N m"
             raise InputError(
                 f"{scene.name}: no steady state at {speed:g} rad/s: a torque of {torque:g} N m "
-                f"acts on pitch {column}, "
-                f"which has no spring, and {balance}"
+                f"acts on pitch {column}, which has no spring, and {balance}"
             )
 
 

@@ -24,7 +24,7 @@ class TaylorSettings(Settings):
     """heyoka's adaptive Taylor method, double precision."""
 
     tolerance: float = number(
-        _EPS, above=0.0, doc=("tolerance of the local error, absolute and relative")
+        _EPS, above=0.0, doc="tolerance of the local error, absolute and relative"
     )
 
 

@@ -337,17 +337,15 @@ def _header(scene: Scene, steps: int, has_loads: bool) -> str:
             "one to the next."
         ),
         (
-            "Start from the keyframe: mj_resetDataKeyframe(model, data, 0); then "
-            "mj_step(model, data, "
-            "nstep=...)."
+            "Start from the keyframe: mj_resetDataKeyframe(model, data, 0); then mj_step(model, "
+            "data, nstep=...)."
         ),
     ]
     if has_loads:
         lines += [
             (
-                "An actuator's activation is its torque in N m, its control the slope of "
-                "the torque "
-                "in N m/s. An actuator"
+                "An actuator's activation is its torque in N m, its control the slope of the "
+                "torque in N m/s. An actuator"
             ),
             (
                 '"rest ..." has the rest angle of a spring in rad instead, and the stiffness as '
@@ -360,8 +358,8 @@ def _header(scene: Scene, steps: int, has_loads: bool) -> str:
             "Where a segment starts between two steps, shorten model.opt.timestep to stop there.",
         ]
     lines.append(
-        "Point masses have the least inertia that MuJoCo compiles, 2e-15 kg m^2 about "
-        "the centre of mass."
+        "Point masses have the least inertia that MuJoCo compiles, 2e-15 kg m^2 about the centre "
+        "of mass."
     )
     # XML allows no two hyphens in a comment.
     return "\n  " + "\n  ".join(line.replace("--", "- -") for line in lines) + "\n"

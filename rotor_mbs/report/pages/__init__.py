@@ -325,14 +325,14 @@ def numbers_sentence(claims: Iterable[Published]) -> Markup:
     printed, corrected = reproduced(numbers)
     if printed == len(numbers) and corrected == 0:
         text = (
-            "All {} numbers that the paper publishes come out of the printed equations and "
-            "none out of the "
+            "All {} numbers that the paper publishes come out of the printed equations and none "
+            "out of the "
         )
         text += "corrected ones: its curves show the errors, not the rotor."
         return Markup(text).format(in_words(len(numbers)))
     text = (
-        "Of {} numbers that the paper publishes <b>{}</b> come out of the printed equations "
-        "and <b>{}</b> out of "
+        "Of {} numbers that the paper publishes <b>{}</b> come out of the printed equations and "
+        "<b>{}</b> out of "
     )
     text += "the corrected ones."
     words = [in_words(count) if count else "none" for count in (printed, corrected)]
@@ -375,7 +375,7 @@ def agreement_table(scene: StoredScene, suite_runs: Sequence[SuiteRun] = ()) -> 
         "Method",
         "Status",
         "Largest angle error up to the horizon (rad)",
-        ("Largest interval defect (rad)"),
+        "Largest interval defect (rad)",
         "Energy error / energy scale",
         "Run time (s)",
     )

@@ -173,7 +173,7 @@ def _facts(scenes: Mapping[str, Sequence[Record]]) -> list[Fact]:
         Fact(
             "Methods",
             str(methods),
-            (f"{len({curve.name for curve in curves})} with their variants"),
+            f"{len({curve.name for curve in curves})} with their variants",
         ),
         Fact(
             "Settings that were timed",
@@ -203,29 +203,27 @@ def _conditions(name: str, curves: Sequence[Record]) -> str:
     facts = curves[0].attributes
     if facts["horizon_s"] < facts["duration_s"]:
         text = (
-            f"Times are for the whole {number(facts['duration_s'], 3)} s; errors are "
-            "evaluated up to "
-            f"{with_unit(facts['horizon_s'], 's', 3)}, the last of the samples used here before "
+            f"Times are for the whole {number(facts['duration_s'], 3)} s; errors are evaluated up "
+            f"to {with_unit(facts['horizon_s'], 's', 3)}, the last of the samples used here before "
             "the horizon."
         )
     else:
         text = (
-            f"Times and errors are for the whole {number(facts['duration_s'], 3)} s; the "
-            "horizon is not reached."
+            f"Times and errors are for the whole {number(facts['duration_s'], 3)} s; the horizon "
+            "is not reached."
         )
     text += f" Uncertainty of the reference: {with_unit(facts['uncertainty_rad'], 'rad')}. "
     if "is_short" in facts:
         return text + (
             "Each method has a few settings, each run once in parallel with other runs: times may "
-            "be wrong by a factor "
-            f"of four or more. rotor-mbs bench {name} measures them accurately."
+            f"be wrong by a factor of four or more. rotor-mbs bench {name} measures them "
+            "accurately."
         )
     core = "any core" if facts["pinned_core"] < 0 else f"core {facts['pinned_core']}"
     return text + (
         f"One process at a time on {core}, garbage collection disabled, all points timed in "
-        "alternating rounds, within "
-        f"{number(facts['budget_s'], 3)} s; load average of the machine before: "
-        f"{number(facts['load_before'])}."
+        f"alternating rounds, within {number(facts['budget_s'], 3)} s; load average of the machine "
+        f"before: {number(facts['load_before'])}."
     )
 
 

@@ -276,7 +276,7 @@ def _channel_section(record: Record, verdict: DataVerdict, marks: Sequence[Mark]
     heading = (
         "Data and reference"
         if verdict.axis == "time"
-        else ("Frequencies of the data and of the reference")
+        else "Frequencies of the data and of the reference"
     )
     say = "" if verdict.axis == "time" else "Horizontally: rotor speed (rad/s)."
     return Section("channels", heading, elements if plots else [], say)
@@ -322,8 +322,8 @@ def _error_section(record: Record, verdict: DataVerdict, marks: Sequence[Mark]) 
     )
     say = (
         (
-            "The defect of an interval tells where in time the data depart from the equations "
-            "of motion."
+            "The defect of an interval tells where in time the data depart from the equations of "
+            "motion."
         )
         if defects
         else ""

@@ -306,9 +306,8 @@ def _scene_sections(scene: SceneModes, name: str, *, with_name: bool) -> list[Se
     ):
         legend, cards = _campbell(rotation, name, axis_name)
         say = (
-            "Horizontally: rotor speed (rad/s), in steady rotation without gravity; a torque "
-            "keeps the speed. Frequencies are in the rotor's frame; 1P, 2P: multiples of the "
-            "rotor speed."
+            "Horizontally: rotor speed (rad/s), in steady rotation without gravity; a torque keeps "
+            "the speed. Frequencies are in the rotor's frame; 1P, 2P: multiples of the rotor speed."
         )
         sections.append(
             Section(f"{name}-rotation", f"{before}Campbell diagram", [legend, Grid(2, cards)], say)
@@ -455,23 +454,23 @@ def _turning(scene: SceneModes, name: str, axis_name: str) -> Section | None:
         least=_NOTHING,
     )
     say = (
-        "Under gravity a rotating rotor has no equilibrium but a periodic motion. Multipliers "
-        "are the eigenvalues of its state transition matrix over one revolution; the largest "
-        "excludes those that are 1 for every such motion. For 0 rad/s see the modes at rest."
+        "Under gravity a rotating rotor has no equilibrium but a periodic motion. Multipliers are "
+        "the eigenvalues of its state transition matrix over one revolution; the largest excludes "
+        "those that are 1 for every such motion. For 0 rad/s see the modes at rest."
     )
     return Section(f"{name}-turning", "Rotation under gravity", [Grid(2, [[plot], [rates]])], say)
 
 
 _AT_REST = (
     "Small motions about the equilibrium that is found from the initial angles by decreasing the "
-    "potential energy, without the torque on the rotor. The shapes of modes with equal "
-    "frequencies are not unique: any linear combination of them is a mode shape."
+    "potential energy, without the torque on the rotor. The shapes of modes with equal frequencies "
+    "are not unique: any linear combination of them is a mode shape."
 )
 _FRAMES = (
-    "Frequencies are in the rotor's frame; in the base frame a pair of cosine and sine modes is "
-    "a backward and a forward whirl, with the frequency decreased and increased by the rotor "
-    "speed times its number. Undamped frequency: square root of the product of a mode's two "
-    "eigenvalues. Damping ratio: minus their mean, relative to that."
+    "Frequencies are in the rotor's frame; in the base frame a pair of cosine and sine modes is a "
+    "backward and a forward whirl, with the frequency decreased and increased by the rotor speed "
+    "times its number. Undamped frequency: square root of the product of a mode's two eigenvalues. "
+    "Damping ratio: minus their mean, relative to that."
 )
 _SMALL_MOTIONS = "The geometric stiffness of the chain's constraint forces is included."
 

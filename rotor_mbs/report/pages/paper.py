@@ -146,10 +146,8 @@ def study_note(study: ClaimStudy) -> str:
     durations = ", ".join(f"{duration:g}" for duration in study.durations)
     return (
         f"Based on {study.runs} runs of each scene for each of the durations {durations} s, with "
-        "initial angles moved "
-        f"by up to {number(study.spread)} rad. A run is deciding if it reached its end without a "
-        "large energy gain. "
-        f"{study.rule}"
+        f"initial angles moved by up to {number(study.spread)} rad. A run is deciding if it "
+        f"reached its end without a large energy gain. {study.rule}"
     )
 
 
@@ -290,8 +288,8 @@ def errata_page(report: Report) -> PageContent:
         elements: list[Element] = [Listing(items)]
         for equation, rows in matrices(entries, erratum.stands_in):
             text = (
-                f"{equation} as printed; wrong entries are struck out and followed by the "
-                "correct ones"
+                f"{equation} as printed; wrong entries are struck out and followed by the correct "
+                "ones"
             )
             elements.append(Matrix(text, rows))
         sections.append(
@@ -318,8 +316,8 @@ def errata_page(report: Report) -> PageContent:
         )
     hint = f"{len(differing)} that differ"
     say = (
-        "Difference: the largest over random states, relative to the larger of 1, the printed "
-        "and the correct value."
+        "Difference: the largest over random states, relative to the larger of 1, the printed and "
+        "the correct value."
     )
     table = PageTable("Printed entries that differ", head, rows_of_entries, wide=(4,))
     sections.append(Section("entries", "Checked entries", [Fold("Entries", hint, [table])], say))
@@ -329,12 +327,12 @@ def errata_page(report: Report) -> PageContent:
 
 _METHOD = Markup(
     "By the paper's own definition the printed matrices U, (8), (9) and (16) to (19), are the "
-    "first and second derivatives of its transformation (3) with respect to the angles; mass, "
-    "rate and gravity terms follow from the same transformation by Lagrange's equations. Each "
-    "printed entry was compared, at random states, with the entry derived from (3). Notation: "
-    "s<sub>i</sub> = sin q<sub>i</sub>, c<sub>i</sub> = cos q<sub>i</sub>; c and d without "
-    "index: distances of the centre of mass from the pitch axis and, along that axis, from the "
-    "shaft; d<sub>2</sub>: constant offset along the shaft."
+    "first and second derivatives of its transformation (3) with respect to the angles; mass, rate "
+    "and gravity terms follow from the same transformation by Lagrange's equations. Each printed "
+    "entry was compared, at random states, with the entry derived from (3). Notation: "
+    "s<sub>i</sub> = sin q<sub>i</sub>, c<sub>i</sub> = cos q<sub>i</sub>; c and d without index: "
+    "distances of the centre of mass from the pitch axis and, along that axis, from the shaft; "
+    "d<sub>2</sub>: constant offset along the shaft."
 )
 _ALONE = (
     "Each erratum alone in the corrected equations is integrated with ode45 at the paper's "

@@ -80,8 +80,8 @@ HORIZON_NOTE = (
     "Horizon: the time until which an error of the initial state has grown by less than a factor "
     "of 100 000; after it two accurate solutions may differ visibly. Energy error: change of the "
     "total energy minus the work, relative to the energy scale: sum over the blades of weight "
-    "times distance of the centre of mass from the hub centre, plus the initial kinetic and "
-    "spring energy, plus the largest work."
+    "times distance of the centre of mass from the hub centre, plus the initial kinetic and spring "
+    "energy, plus the largest work."
 )
 DEFECT_NOTE = (
     "From each sample the corrected equations are integrated to the next one; the defect is the "
@@ -258,7 +258,7 @@ def _paper_facts(scene: StoredScene, claims: Sequence[Published]) -> list[Fact]:
         elif gain <= ENERGY_RISE * scale:
             value, note = (
                 "none",
-                (f"{prefixed(gain, 'J')} is {number(gain / scale, 1)} of the energy scale"),
+                f"{prefixed(gain, 'J')} is {number(gain / scale, 1)} of the energy scale",
             )
         facts.append(Fact("Energy created by the printed model", value, note))
     for claim in claims:

@@ -125,15 +125,14 @@ def stability_page(report: Report) -> PageContent:
     count_rows: list[Row] = [(method_cell(method), *cells) for method, *cells in counted.rows]
     count_table = PageTable("Number of ok runs", counted.head, count_rows)
     note = (
-        "Only scenes that have a solution are counted. After a +: runs that are ok with a "
-        "smaller step. Runs of the printed equations are counted as completed. Last column: "
-        "wrong results that the engine reported as success."
+        "Only scenes that have a solution are counted. After a +: runs that are ok with a smaller "
+        "step. Runs of the printed equations are counted as completed. Last column: wrong results "
+        "that the engine reported as success."
     )
     how = (
-        "A mark is the status of the run, determined from its samples: finite values, end "
-        "reached, energy balance, gaps in joints, difference from a quad-precision reference up "
-        "to the horizon. A reported success is not relied on. The page of a scene has the "
-        "reasons."
+        "A mark is the status of the run, determined from its samples: finite values, end reached, "
+        "energy balance, gaps in joints, difference from a quad-precision reference up to the "
+        "horizon. A reported success is not relied on. The page of a scene has the reasons."
     )
     meaning = Note(" · ".join(f"{symbol} {words}" for symbol, words in key))
     summary: list[Element] = [count_table, Note(note)] if len(scenes) > 1 else []

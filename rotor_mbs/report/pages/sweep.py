@@ -170,8 +170,8 @@ def sweep_page(stored: StoredSweep) -> PageContent:
         if curves and (places < 0).any():
             count = int((places >= 0).sum())
             say = (
-                f"Curves of {count} of {len(places)} runs: those that are not "
-                f"{sweep.good_words}, the corners, "
+                f"Curves of {count} of {len(places)} runs: those that are not {sweep.good_words}, "
+                "the corners, "
             )
             say += "and every few."
             if len(stored.methods) > 1:
@@ -498,7 +498,7 @@ def _map(
     texts = ([brief(value) for value in values] for values in (columns, rows[::-1]))
     columns_text, rows_text = texts
     return HeatMap(
-        label, names, columns_text, rows_text, cells, (f"{note} Click a cell for its curves.")
+        label, names, columns_text, rows_text, cells, f"{note} Click a cell for its curves."
     )
 
 

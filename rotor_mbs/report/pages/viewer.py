@@ -76,8 +76,8 @@ def viewer(stored: StoredScene, runs: Mapping[str, StoredRun]) -> dict[str, Any]
         largest = float(np.abs(np.diff(angles, axis=0)).max(initial=0.0))
         if largest > _COARSE:
             turned = (
-                f"{with_capital(name)} turns by up to {with_unit(largest, 'rad')} from one "
-                "frame to the next"
+                f"{with_capital(name)} turns by up to {with_unit(largest, 'rad')} from one frame "
+                "to the next"
             )
             notes.append(f"{turned}: the animation interpolates linearly in between.")
     return {
