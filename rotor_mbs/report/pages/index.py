@@ -325,11 +325,9 @@ def _departure_cells(scene: StoredScene) -> list[TableCell | str]:
     elif printed.status not in GOOD:
         cells.append(TableCell("runs away", order=gain))
     elif created_energy(scene) is None:
-        cells.append(
-            TableCell(
-                "none", note=f"{prefixed(gain, 'J', 2) if gain >= 1.0 else 'below 1 J'}", order=gain
-            )
-        )
+        size = prefixed(gain, "J", 2) if gain >= 1.0 else "below 1 J"
+        note = f"below {ENERGY_RISE:g} of the scale" if gain >= 1.0 else ""
+        cells.append(TableCell(size, note=note, order=gain))
     else:
         cells.append(TableCell(prefixed(gain, "J"), order=gain))
     return cells
