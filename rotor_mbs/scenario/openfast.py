@@ -493,7 +493,7 @@ def _beamdyn_blade(main: InputFile, structure: InputFile, number: int) -> BladeM
     Raises
     ------
     InputError
-        If all key points are equal, or the blade has no mass.
+        If the blade has no mass.
     """
     import numpy as np  # late: a scene is read without it
 
@@ -501,35 +501,7 @@ def _beamdyn_blade(main: InputFile, structure: InputFile, number: int) -> BladeM
     sections = file.file("BldFile", "an input file of a BeamDyn blade")
     axis, twist = _reference_axis(file)
     fractions, matrices = _stations(sections)
-
-    mass, moment, about_root = 0.0, np.zeros(3), np.zeros((3, 3))
-    pieces = np.diff(axis, axis=0)
-    lengths = np.sqrt((pieces**2).sum(axis=1))
-    if lengths.sum() <= 0.0:
-        raise file.problem("kp_total", "all key points are one", "key points along the blade")
-    at_key_points = np.concatenate([[0.0], np.cumsum(lengths)]) / lengths.sum()
-    # Between two of these points mass and axis are linear; three points of Gauss's rule are exact
-    # for their product with the square of a distance.
-    bounds = np.unique(np.concatenate([at_key_points, fractions]))
-    bounds = bounds[(bounds >= fractions[0]) & (bounds <= fractions[-1])]
-    points, weights = np.polynomial.legendre.leggauss(3)
-    for left, right in pairwise(bounds):
-        piece = min(int(np.searchsorted(at_key_points, 0.5 * (left + right))) - 1, len(lengths) - 1)
-        tangent = pieces[piece] / lengths[piece]
-        for point, weight in zip(points, weights, strict=True):
-            eta = 0.5 * (left + right) + 0.5 * (right - left) * point
-            ds = 0.5 * (right - left) * weight * lengths.sum()
-            share = (eta - at_key_points[piece]) * lengths.sum() / lengths[piece]
-            position = axis[piece] + share * pieces[piece]
-            angle = twist[piece] + share * (twist[piece + 1] - twist[piece])
-            turned = _section_axes(tangent, math.radians(angle))
-            per_length, offset, inertia = _section(matrices, fractions, eta)
-            # The tensor is about the section's origin: to its centre of mass, and to the root.
-            centre = position + turned @ offset
-            own = turned @ (inertia - per_length * _steiner(offset)) @ turned.T
-            mass += per_length * ds
-            moment += per_length * ds * centre
-            about_root += ds * (own + per_length * _steiner(centre))
+    mass, moment, about_root = _mass_properties(axis, twist, fractions, matrices)
     if not mass >= keys.SMALLEST:
         raise sections.problem("station_total", "the blade has no mass", "a mass above 0")
 
@@ -545,7 +517,7 @@ def _beamdyn_blade(main: InputFile, structure: InputFile, number: int) -> BladeM
     tip_x, tip_y, tip_z = (float(coordinate) for coordinate in to_scene @ axis[-1])
     return BladeModel(
         source=f"integral over BeamDyn's {len(fractions)} stations",
-        mass=float(mass),
+        mass=mass,
         first_moment=float(moment[2]),
         # The integral of z² over the mass, by the moments of inertia about the root.
         second_moment=float(0.5 * (about_root[0, 0] + about_root[1, 1] - about_root[2, 2])),
@@ -557,6 +529,56 @@ def _beamdyn_blade(main: InputFile, structure: InputFile, number: int) -> BladeM
     )
 
 
+def _mass_properties(
+    axis: NDArray[np.float64],
+    twist: NDArray[np.float64],
+    fractions: NDArray[np.float64],
+    matrices: NDArray[np.float64],
+) -> tuple[float, NDArray[np.float64], NDArray[np.float64]]:
+    """Integrate the mass of a blade over its reference axis, in OpenFAST's axes of the blade root.
+
+    Parameters
+    ----------
+    axis, twist : (k, 3) m and (k,) degrees at the key points, linear between.
+    fractions, matrices : (n,) and (n, 6, 6), see `_stations`.
+
+    Returns
+    -------
+    float, ndarray, ndarray
+        Mass, kg; first moment about the root, (3,) kg m; inertia about it, (3, 3) kg m².
+    """
+    import numpy as np  # late, as above
+
+    mass, moment, about_root = 0.0, np.zeros(3), np.zeros((3, 3))
+    pieces = np.diff(axis, axis=0)
+    lengths = np.sqrt((pieces**2).sum(axis=1))
+    at_key_points = np.concatenate([[0.0], np.cumsum(lengths)]) / lengths.sum()
+    # Between two of these points mass and axis are linear; three points of Gauss's rule are exact
+    # for their product with the square of a distance.
+    bounds = np.unique(np.concatenate([at_key_points, fractions]))
+    bounds = bounds[(bounds >= fractions[0]) & (bounds <= fractions[-1])]
+    points, weights = np.polynomial.legendre.leggauss(3)
+    for left, right in pairwise(bounds):
+        middle, half = 0.5 * (left + right), 0.5 * (right - left)
+        piece = min(int(np.searchsorted(at_key_points, middle)) - 1, len(lengths) - 1)
+        tangent = pieces[piece] / lengths[piece]
+        for point, weight in zip(points, weights, strict=True):
+            eta = middle + half * point
+            ds = half * weight * lengths.sum()
+            share = (eta - at_key_points[piece]) * lengths.sum() / lengths[piece]
+            position = axis[piece] + share * pieces[piece]
+            angle = twist[piece] + share * (twist[piece + 1] - twist[piece])
+            turned = _section_axes(tangent, math.radians(angle))
+            per_length, offset, inertia = _section(matrices, fractions, eta)
+            # The tensor is about the section's origin: to its centre of mass, and to the root.
+            centre = position + turned @ offset
+            own = turned @ (inertia - per_length * _steiner(offset)) @ turned.T
+            mass += per_length * ds
+            moment += per_length * ds * centre
+            about_root += ds * (own + per_length * _steiner(centre))
+    return float(mass), moment, about_root
+
+
 def _steiner(point: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the inertia of a unit mass at a point about the origin, (3, 3) m²."""
     import numpy as np  # late, as above
@@ -566,7 +588,17 @@ def _steiner(point: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _reference_axis(file: InputFile) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return key points, (n, 3) m from the root in OpenFAST's axes, and twists, (n,) degrees."""
+    """Return key points, (n, 3) m from the root in OpenFAST's axes, and twists, (n,) degrees.
+
+    Parameters
+    ----------
+    file : BeamDyn's primary file.
+
+    Raises
+    ------
+    InputError
+        If the table is missing, or all key points are equal.
+    """
     import numpy as np  # late, as above
 
     count = file.whole("kp_total", 2, MAX_ROWS)
@@ -578,7 +610,10 @@ def _reference_axis(file: InputFile) -> tuple[NDArray[np.float64], NDArray[np.fl
     table = np.array([row[:4] for row in rows])
     # The last point of a member is the first of the next one.
     is_new = np.concatenate([[True], (np.diff(table[:, :3], axis=0) != 0.0).any(axis=1)])
-    return table[is_new, :3], table[is_new, 3]
+    points, twists = table[is_new, :3], table[is_new, 3]
+    if not (np.diff(points, axis=0) ** 2).sum() > 0.0:
+        raise file.problem("kp_total", "all key points are one", "key points along the blade")
+    return points, twists
 
 
 def _stations(file: InputFile) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
