@@ -173,7 +173,7 @@ def read_rotor(path: Path) -> OpenFastRotor:
         hub_mass=structure.number("HubMass", keys.NOT_NEGATIVE),
         hub_centre_of_mass=structure.number("HubCM", keys.SIZE),
         hub_inertia=(hub, generator * ratio**2),
-        hub_inertia_text=f"{hub_text} + {_text(generator)}*{_text(ratio)}**2",
+        hub_inertia_text=f"{hub_text} + {plain_number(generator)}*{plain_number(ratio)}**2",
         tilt=structure.number("ShftTilt", _TILT),
         gravity=gravity_file.number("Gravity", keys.NOT_NEGATIVE),
         azimuth=structure.number("Azimuth", _ANGLE),
@@ -186,8 +186,8 @@ def read_rotor(path: Path) -> OpenFastRotor:
     )
 
 
-def _text(number: float) -> str:
-    """Return a number as the scene file has it, without a superfluous ".0"."""
+def plain_number(number: float) -> str:
+    """Return a number for arithmetic in a scene file, without a superfluous ".0"."""
     return repr(number).removesuffix(".0")
 
 
@@ -214,7 +214,7 @@ def _hub_inertia(structure: InputFile, count: int) -> tuple[float, str]:
     """
     inertia = structure.number("HubIner", keys.NOT_NEGATIVE)
     if count != 2 or "HubIner_Teeter" in structure:
-        return inertia, _text(inertia)
+        return inertia, plain_number(inertia)
     # Before OpenFAST 4.2 it is that about the teeter axis of a two-bladed rotor. The program takes
     # it for that about the shaft, too, after moving it to the hub's centre of mass.
     mass = structure.number("HubMass", keys.NOT_NEGATIVE)
@@ -227,8 +227,9 @@ def _hub_inertia(structure: InputFile, count: int) -> tuple[float, str]:
         what = f"{inertia:g} kg m² is below HubMass (UndSling - HubCM)²"
         raise structure.problem("HubIner", what, f"at least {least:g} for two blades")
     if not mass * arm:
-        return inertia, _text(inertia)
-    text = f"{_text(inertia)} - {_text(mass)}*({_text(undersling)} - {_text(centre)})**2"
+        return inertia, plain_number(inertia)
+    distance = f"{plain_number(undersling)} - {plain_number(centre)}"
+    text = f"{plain_number(inertia)} - {plain_number(mass)}*({distance})**2"
     return about_shaft, text.replace("- -", "+ ")
 
 

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 from rotor_mbs.errors import InputError
 from rotor_mbs.scenario.keys import MAX_TEXT
-from rotor_mbs.scenario.openfast import BladeModel, OpenFastRotor, read_rotor
+from rotor_mbs.scenario.openfast import BladeModel, OpenFastRotor, plain_number, read_rotor
 from rotor_mbs.scenario.scene import Scene, parse_scene
 from rotor_mbs.scenario.toml_file import file_path, shown_path, toml_value
 
@@ -141,9 +141,9 @@ def _blade_lines(blade: BladeModel, rotor: OpenFastRotor) -> list[str]:
         )
     if on_axis and not blade.inertia[2]:
         lines += _comment("Without an inertia about its axis a pitch is no coordinate: it stays.")
-    radius = _plain(rotor.hub_radius)
-    centre = [_number(x), _number(y), f'"{radius} + {_plain(z)}"']
-    tip = [_number(tip_x), _number(tip_y), f'"{radius} + {_plain(tip_z)}"']
+    radius = plain_number(rotor.hub_radius)
+    centre = [_number(x), _number(y), f'"{radius} + {plain_number(z)}"']
+    tip = [_number(tip_x), _number(tip_y), f'"{radius} + {plain_number(tip_z)}"']
     return [
         *lines,
         _entry("mass", blade.mass, "kg"),
@@ -165,7 +165,7 @@ def _hub_and_start_lines(rotor: OpenFastRotor) -> list[str]:
     azimuth = rotor.azimuth - rotor.azimuth_up
     angles = [_angle(azimuth), *(_angle(-blade.pitch) for blade in rotor.blades)]
     rates = [
-        f'"{_plain(rotor.speed)}*pi/30"' if rotor.speed else "0.0",
+        f'"{plain_number(rotor.speed)}*pi/30"' if rotor.speed else "0.0",
         *["0.0"] * len(rotor.blades),
     ]
     inertia = f'inertia = "{rotor.hub_inertia_text}"'
@@ -204,8 +204,10 @@ def _bearing_lines(rotor: OpenFastRotor) -> list[str]:
         if not any(inertias):
             return []
         rate = f"(2*pi*{HOLDING_FREQUENCY:g})"
-        stiffness = [f'"{_plain(inertia)}*{rate}**2"' for inertia in inertias]
-        damping = [f'"2*{HOLDING_DAMPING:g}*{_plain(inertia)}*{rate}"' for inertia in inertias]
+        stiffness = [f'"{plain_number(inertia)}*{rate}**2"' for inertia in inertias]
+        damping = [
+            f'"2*{HOLDING_DAMPING:g}*{plain_number(inertia)}*{rate}"' for inertia in inertias
+        ]
         comments = _comment(
             "The model prescribes the pitch. This spring keeps it: it is assumed, a pitch inertia "
             f"at {HOLDING_FREQUENCY:g} Hz with {HOLDING_DAMPING:g} of critical damping."
@@ -260,11 +262,6 @@ def _comment(text: str, indent: str = "") -> list[str]:
     )
 
 
-def _plain(number: float) -> str:
-    """Return a number for arithmetic, without a superfluous ".0"."""
-    return repr(number).removesuffix(".0")
-
-
 def _number(number: float) -> str:
     """Return a number in TOML, without the sign of a zero."""
     return repr(number + 0.0)
@@ -272,7 +269,7 @@ def _number(number: float) -> str:
 
 def _angle(degrees: float) -> str:
     """Return an angle in TOML, "deg(-2.5)" in quotes."""
-    return f'"deg({_plain(degrees)})"' if degrees else "0.0"
+    return f'"deg({plain_number(degrees)})"' if degrees else "0.0"
 
 
 def _entry(key: str, number: float, comment: str) -> str:
