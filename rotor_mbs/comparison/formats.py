@@ -60,6 +60,7 @@ _DEFAULT_FILL = {
     "i4": -2147483647,
     "i8": -9223372036854775806,
 }
+_PACKING = ("scale_factor", "add_offset", "_FillValue", "missing_value")  # attributes
 _MAX_PARTS = 10_000  # arrays, cells and fields of a MAT or JSON file that are read
 
 # Text: comma-separated values, columns divided by blanks, Exudyn's files, OpenFAST's `.out`.
@@ -446,30 +447,29 @@ def _decoded(source: str, arrays: Arrays, attributes: Mapping[str, Mapping[str, 
         for key in ("_FillValue", "missing_value"):
             if key in facts:
                 facts[key] = np.asarray(facts[key]).ravel()[0]
-        scale = facts.get("scale_factor")
-        if scale is not None and values.dtype.kind in "iu":
-            steps[name] = abs(float(np.asarray(scale).ravel()[0]))
+        if isinstance(facts.get("_Unsigned"), bytes):  # as SciPy reads netCDF-3
+            facts["_Unsigned"] = facts["_Unsigned"].decode("latin-1")
+        is_packed = not facts.keys().isdisjoint(_PACKING)
+        if is_packed and values.dtype.kind in "iu":
+            if "scale_factor" in facts:
+                steps[name] = abs(float(np.asarray(facts["scale_factor"]).ravel()[0]))
+            # By default xarray may unpack into single precision, whose rounding would be its own:
+            # it takes the precision of these two.
+            for key, default in (("scale_factor", 1.0), ("add_offset", 0.0)):
+                facts[key] = np.float64(np.asarray(facts.get(key, default)).ravel()[0])
         dimensions = [f"dimension_{number}_{axis}" for axis in range(values.ndim)]
         variables[name] = (dimensions, values, facts)
     dataset = xr.decode_cf(
         xr.Dataset(variables), decode_times=False, decode_timedelta=False, decode_coords=False
     )
     unpacked = {name: dataset[name].values for name in arrays}
-    for name, values in unpacked.items():
-        is_single = arrays[name].dtype.kind in "iu" and values.dtype == np.float32
-        if is_single:
-            # xarray unpacks 16 bits in single precision, which would be rounding of its own.
-            facts = variables[name][2]
-            scale = float(facts.get("scale_factor", 1.0))
-            offset = float(facts.get("add_offset", 0.0))
-            exact = arrays[name].astype(float) * scale + offset
-            unpacked[name] = np.where(np.isnan(values), np.nan, exact)
     overflown = {}
     for name in steps:
         stored = arrays[name].ravel()
         # A number that is too large for 32 or 64 bits becomes the least one of them.
         is_least = (stored == np.iinfo(stored.dtype).min) & np.isfinite(unpacked[name].ravel())
-        if stored.dtype.kind == "i" and stored.itemsize > 2 and is_least.any():
+        is_signed = stored.dtype.kind == "i" and variables[name][2].get("_Unsigned") != "true"
+        if is_signed and stored.itemsize > 2 and is_least.any():
             row = int(is_least.argmax()) // math.prod(arrays[name].shape[1:]) + 1
             reason = f"row {row} has {stored.min()}, packed from a number that did not fit"
             overflown[name] = LeftOut(reason, is_column=True)

@@ -20,6 +20,7 @@ from support.scenes import paper
 import rotor_mbs as rm
 from rotor_mbs.comparison.channels import channels
 from rotor_mbs.comparison.data import ForeignData, load_data
+from rotor_mbs.comparison.formats import read_in_worker
 from rotor_mbs.comparison.units import unit_factor
 from rotor_mbs.errors import InputError
 
@@ -176,6 +177,50 @@ def packed(path: Path) -> None:
             file[name] = np.round((values - 0.25) / 2.0**-30).astype(np.int32)
             file[name].attrs.update({"units": "rad/s" if "rate" in name else "rad"})
             file[name].attrs.update({"scale_factor": 2.0**-30, "add_offset": 0.25})
+
+
+@pytest.mark.parametrize(
+    ("stored", "attributes", "expected"),
+    [
+        (
+            np.int16([-2, 3, 7]),
+            {"_Unsigned": "true", "_FillValue": np.int16(7)},
+            [65534, 3, np.nan],
+        ),
+        (np.int32([-(2**31), 3]), {"_Unsigned": "true", "scale_factor": 0.5}, [2**30, 1.5]),
+        (np.int16([-2, 3]), {"scale_factor": [0.1]}, [-0.2, 3 * 0.1]),
+        (np.int16([-2, 3]), {"scale_factor": np.float32(0.5), "add_offset": 0.25}, [-0.75, 1.75]),
+        (
+            np.int32([2**24 + 1, 5]),
+            {"scale_factor": np.float32(0.5), "_FillValue": np.int32(5)},
+            [2**23 + 0.5, np.nan],
+        ),
+        (
+            np.int32([2**30 + 1, 3]),
+            {"scale_factor": np.float32(0.5), "missing_value": np.int32(2**30 + 1)},
+            [np.nan, 1.5],
+        ),
+    ],
+)
+def test_integers_are_unpacked_in_double_precision(
+    tmp_path: Path, stored: Any, attributes: Mapping[str, Any], expected: list[float]
+) -> None:
+    path = tmp_path / "packed.h5"
+    with h5py.File(path, "w") as file:
+        file["angle"] = stored
+        file["angle"].attrs.update(attributes)
+    np.testing.assert_array_equal(read_in_worker((path, "", ""))["angle"].values, expected)
+
+
+def test_unsigned_integers_of_netcdf_3_are_read(tmp_path: Path) -> None:
+    path = tmp_path / "packed.nc"
+    with scipy.io.netcdf_file(path, "w") as file:
+        file.createDimension("time", 2)
+        angle = file.createVariable("angle", "i2", ("time",))
+        angle[:] = [-2, 3]
+        angle._Unsigned = "true"
+        angle.scale_factor = 0.5
+    np.testing.assert_array_equal(read_in_worker((path, "", ""))["angle"].values, [32767.0, 1.5])
 
 
 def units_in_arrays(path: Path) -> None:
