@@ -228,9 +228,7 @@ def _row_hypotheses(search: TrajectorySearch) -> Iterator[Hypothesis[ForeignData
         yield from _lags(search)
     data = search.data
     reversed_time = (data.time[0] + data.time[-1] - data.time)[::-1]
-    backward = replace(
-        data, time=reversed_time, values=data.values[::-1], rounding=data.rounding[::-1]
-    )
+    backward = replace(data.rows(slice(None, None, -1)), time=reversed_time)
     yield Hypothesis("rows from the end to the start, time reversed", backward)
 
 
