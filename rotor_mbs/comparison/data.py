@@ -24,8 +24,7 @@ from rotor_mbs.comparison.times import ordered_rows, rounding_of_steps
 from rotor_mbs.comparison.units import unit_factor
 from rotor_mbs.errors import InputError
 from rotor_mbs.scenario.scene import Scene
-
-Array = NDArray[np.float64]
+from rotor_mbs.solution.trajectory import Array
 
 _FEW_DIGITS, _SURE_DIGITS, _ALL_DIGITS = 9, 14, 17
 _MAX_WRITTEN = 20_000  # numbers that are written with some digits, evenly chosen: 1 us each

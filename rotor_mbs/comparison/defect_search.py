@@ -57,7 +57,7 @@ _MAX_FITTED_BRIEF = 4
 _DIFFERENCE = 1e-4  # share or rad, for the derivative by a parameter
 _ROUNDS = 8  # of Gauss and Newton's iteration
 _INDEPENDENT = 1e-6  # determinant of the cosines between the signatures of a set
-_MAX_NAMED = 6  # explanations, or faults
+_MAX_NAMED = 6  # explanations
 
 
 class DefectSearch:

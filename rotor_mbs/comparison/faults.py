@@ -22,7 +22,7 @@ from rotor_mbs.scenario.time_table import torque_place
 from rotor_mbs.solution.trajectory import Array
 
 UNKNOWN_FAULT = "a fault"  # begin of the text of a fault whose place alone is known
-_MAX_NAMED = 6
+_MAX_NAMED = 6  # faults
 _MAX_STEPS = 512  # of Runge and Kutta in an interval
 _STANDS_OUT = 30.0  # times the median of the defects
 _FAINT = 0.02  # of the largest defect: smaller ones are not reported beside it

@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 
 from rotor_mbs.errors import InputError
 from rotor_mbs.scenario.time_table import ALIGNMENT
-
-Array = NDArray[np.float64]
+from rotor_mbs.solution.trajectory import Array
 
 _NEAR_ZERO = 1e-9  # of an interval: a time that is nearer to 0 is taken as 0
 _SAME_STATE = 1e-9  # absolute or relative: difference of the same state computed twice
