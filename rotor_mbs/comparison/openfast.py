@@ -139,8 +139,9 @@ def suggested(
         if math.isnan(hub):
             reasons[name] = "turns with the moment of the hub's weight (HubCM); LSSTipMys is read"
             continue
-        if hub and unit_factor(unit, channel.kind):
-            suggestion = suggestion._replace(offset=hub / (unit_factor(unit, channel.kind) or 1.0))
+        factor = unit_factor(unit, channel.kind)
+        if hub and factor:
+            suggestion = suggestion._replace(offset=hub / factor)
         if channel.name in found:
             reasons[name] = f"{channel.name} is read from {found[channel.name].column!r}"
             continue

@@ -6,6 +6,7 @@ named if it leaves at most a thousandth of the difference; for loads and tips on
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
@@ -436,7 +437,7 @@ def _by_load(scene: Scene, matrix: Array) -> dict[str, Array]:
             shape.append(len(scene.blades))
         if "axis" in load.dimensions:
             shape.append(3)
-        count = int(np.prod(shape)) if shape else 1
+        count = math.prod(shape)
         arrays[load.name] = matrix[:, first : first + count].reshape(len(matrix), *shape)
         first += count
     return arrays

@@ -162,25 +162,13 @@ def test_from_a_model_to_a_verdict(tmp_path: Path) -> None:
 
 
 def test_the_program_is_one_that_is_known(tmp_path: Path) -> None:
-    (tmp_path / "data.csv").write_text("time,rotor\n0,0\n1,1\n2,2\n")
-    (tmp_path / "map.toml").write_text('program = "bladed"\n')
-    line = refusal(
-        "compare",
-        tmp_path / "data.csv",
-        "--scene",
-        "paper/fig03",
-        "--columns",
-        tmp_path / "map.toml",
-    )
+    data, mapping = tmp_path / "data.csv", tmp_path / "map.toml"
+    data.write_text("time,rotor\n0,0\n1,1\n2,2\n")
+    command = ("compare", data, "--scene", "paper/fig03", "--columns", mapping)
+    mapping.write_text('program = "bladed"\n')
+    line = refusal(*command)
     assert 'map.toml:1: program: "bladed" is not one of them; allowed: one of openfast' in line
-    (tmp_path / "map.toml").write_text('program = "openfast"\n[openfast]\nAzimB1 = 3\n')
-    line = refusal(
-        "compare",
-        tmp_path / "data.csv",
-        "--scene",
-        "paper/fig03",
-        "--columns",
-        tmp_path / "map.toml",
-    )
+    mapping.write_text('program = "openfast"\n[openfast]\nAzimB1 = 3\n')
+    line = refusal(*command)
     assert "map.toml:3: openfast.AzimB1: " in line
     assert "perhaps AzimB1Up" in line
