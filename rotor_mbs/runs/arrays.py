@@ -13,11 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.errors import StoreError
-from rotor_mbs.runs.hdf5 import (
-    attribute,
-    is_dimension_only,
-    reason_of,
-)
+from rotor_mbs.runs.hdf5 import attribute, is_dimension_only, reason_of
 
 # What says how an array of another program is to be read.
 ARRAY_ATTRIBUTES = (

@@ -15,10 +15,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor_mbs.runs.design import (
-    MISSING,
-    TableSpec,
-)
+from rotor_mbs.runs.design import MISSING, TableSpec
 from rotor_mbs.runs.hdf5 import (
     CHARACTERS,
     TEXT,
@@ -31,14 +28,7 @@ from rotor_mbs.runs.hdf5 import (
 )
 from rotor_mbs.runs.output_files import replacing, write_file
 from rotor_mbs.runs.table import StoredTable, TableFile
-from rotor_mbs.runs.trailer import (
-    FORMAT_VERSION,
-    INTEGRITY,
-    RESULTS,
-    SWEEP,
-    digest_of,
-    trailer_of,
-)
+from rotor_mbs.runs.trailer import FORMAT_VERSION, INTEGRITY, RESULTS, SWEEP, digest_of, trailer_of
 from rotor_mbs.runs.untrusted import trust
 
 FORMAT = "rotor_mbs"

@@ -9,24 +9,13 @@ from pathlib import Path
 from typing import Any
 
 from rotor_mbs.errors import InputError
-from rotor_mbs.runs.design import (
-    MISSING,
-    RUNS,
-    TableSpec,
-    row_order,
-)
-from rotor_mbs.runs.hdf5 import (
-    Column,
-)
+from rotor_mbs.runs.design import MISSING, RUNS, TableSpec, row_order
+from rotor_mbs.runs.hdf5 import Column
 from rotor_mbs.runs.layout import KEYWORDS, create_file
 from rotor_mbs.runs.output_files import locked, write_file
 from rotor_mbs.runs.rows import Rows, blank_rows
 from rotor_mbs.runs.table import IDENTITY, TableFile
-from rotor_mbs.runs.trailer import (
-    RESULTS,
-    may_extend,
-    read_trailer,
-)
+from rotor_mbs.runs.trailer import RESULTS, may_extend, read_trailer
 from rotor_mbs.runs.versions import machine, versions
 
 

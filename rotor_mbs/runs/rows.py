@@ -20,11 +20,7 @@ from numpy.typing import NDArray
 
 from rotor_mbs.errors import StoreError
 from rotor_mbs.methods.catalogue import REFERENCE
-from rotor_mbs.runs.design import (
-    CHARACTER,
-    MISSING,
-    STATUS_COPIES,
-)
+from rotor_mbs.runs.design import CHARACTER, MISSING, STATUS_COPIES
 from rotor_mbs.runs.output_files import store_errors
 from rotor_mbs.solution.status import STATUSES, code_of
 from rotor_mbs.solution.trajectory import Solution

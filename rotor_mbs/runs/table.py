@@ -43,17 +43,9 @@ from rotor_mbs.runs.design import (
     STATUS_COPIES,
     TableSpec,
 )
-from rotor_mbs.runs.hdf5 import (
-    Column,
-    StoredGroup,
-    read_content,
-    reading,
-)
+from rotor_mbs.runs.hdf5 import Column, StoredGroup, read_content, reading
 from rotor_mbs.runs.rows import RowLocation, blank_rows, checksums
-from rotor_mbs.runs.trailer import (
-    RESULTS,
-    SWEEP,
-)
+from rotor_mbs.runs.trailer import RESULTS, SWEEP
 from rotor_mbs.solution.status import STATUSES
 
 # the attribute of a sweep's file with a hash of all that the design says
