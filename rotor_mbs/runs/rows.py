@@ -135,12 +135,21 @@ class RowLocation:
                 rows[name] = np.frombuffer(content, kind.base).reshape(count, *kind.shape)
         return rows
 
+    def statuses(self, count: int = 1) -> NDArray[np.int8]:
+        """Return the verified statuses of `count` rows, (count,) int8.
+
+        A status is MISSING if the row is not stored, or its checksum is wrong.
+        """
+        rows = self.read(count)
+        status = rows["status"]
+        is_right = checksums(self.first, rows, self.row_type) == rows["crc32"]
+        is_known = (status >= 0) & (status < len(STATUSES))
+        return np.where(is_right & is_known, status, np.int8(MISSING))
+
     @property
     def is_stored(self) -> bool:
         """Return whether the first row is stored with a right checksum."""
-        row = self.read()
-        is_known = 0 <= row["status"][0] < len(STATUSES)
-        return bool(is_known and checksums(self.first, row, self.row_type)[0] == row["crc32"][0])
+        return bool(self.statuses()[0] != MISSING)
 
     def mark_missing(self, rows: Collection[int]) -> None:
         """Mark rows as missing, counted from the first, before they are computed again."""
