@@ -436,10 +436,9 @@ def row_order(run: str) -> tuple[Any, ...]:
 
     Scenes are in natural order, in each the reference, then methods in the order of the catalogue.
     """
-    scene, method = (
-        (run.removesuffix(f"/{REFERENCE}"), REFERENCE)
-        if run.endswith(f"/{REFERENCE}")
-        else ("/".join(run.split("/")[:-2]), "/".join(run.split("/")[-2:]))
-    )
+    parts = run.split("/")
+    # A method is model/integrator, but the reference has a name without a model.
+    count = 1 if parts[-1] == REFERENCE else 2
+    scene, method = "/".join(parts[:-count]), "/".join(parts[-count:])
     names = [REFERENCE, *method_names()]
     return natural_key(scene), names.index(method) if method in names else len(names), method

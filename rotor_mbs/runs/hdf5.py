@@ -395,9 +395,6 @@ def reason_of(error: Exception) -> str:
     return text.partition("(")[2].rpartition(")")[0] or text
 
 
-# Making a file fit what is asked
-
-
 def place_of(dataset: Any) -> tuple[int, int]:
     """Return offset and length in bytes of the values of a contiguous dataset."""
     return dataset.id.get_offset() or 0, dataset.nbytes

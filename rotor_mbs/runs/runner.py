@@ -203,8 +203,11 @@ def run_tasks_references_first(
 
     for end in run_tasks(pool, [task for task in tasks if task.reference is None]):
         note(end)
-    waiting = [task for task in tasks if task.reference is not None]
-    ready = [task for task in waiting if task.reference is not None and task.reference.is_stored]
+    ready: list[Task] = []
+    without_reference: list[Task] = []
+    for task in tasks:
+        if task.reference is not None:
+            (ready if task.reference.is_stored else without_reference).append(task)
     # Slowest first, so that no long one starts last and keeps one process busy while the others
     # wait; between them the fastest, which are those that are compiled, so that two processes
     # seldom compile the same code at once.
@@ -217,7 +220,6 @@ def run_tasks_references_first(
     ]
     for end in run_tasks(pool, [*turns, *ready[quarter : count - quarter]]):
         note(end)
-    for task in waiting:
-        if task not in ready:
-            note(TaskEnd(task, None, "no_reference", "its reference was not computed"))
+    for task in without_reference:
+        note(TaskEnd(task, None, "no_reference", "its reference was not computed"))
     return made
