@@ -123,7 +123,9 @@ def rotor_form(
     return _form(scene, convert, phases)
 
 
-@functools.lru_cache(maxsize=16)  # many functions that check one run need it
+# Many functions that check one run need it. Only the doubles are kept: another conversion may count
+# its calls, as that to parameters of compiled code does.
+@functools.lru_cache(maxsize=16)
 def _form_in_doubles(scene: Scene) -> RotorForm:
     return _form(scene, float, None)
 

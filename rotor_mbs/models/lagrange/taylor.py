@@ -106,8 +106,8 @@ def equation_numbers(scene: Scene, parameters: Parameters) -> tuple[RotorForm, L
     return form, load_values(values, scene.moving_coordinates[1:]), work_per_joule
 
 
-_compiled: dict[tuple[object, ...], Any] = {}
-_idle: dict[tuple[object, ...], list[Any]] = {}  # copies whose owners no longer exist
+# By key: the code as it was compiled, and copies of it whose owners no longer exist.
+_compiled: dict[tuple[object, ...], tuple[Any, list[Any]]] = {}
 
 
 def compiled(key: tuple[object, ...], make: Callable[[], Any], owner: object) -> Any:
@@ -123,12 +123,15 @@ def compiled(key: tuple[object, ...], make: Callable[[], Any], owner: object) ->
     owner : the object after whose end the code may be used again.
     """
     if key not in _compiled:
-        _compiled[key], _idle[key] = make(), []
+        _compiled[key] = make(), []
+    original, idle = _compiled[key]
     try:
-        code = _idle[key].pop()
+        code = idle.pop()
     except IndexError:
-        code = copy.deepcopy(_compiled[key])
-    weakref.finalize(owner, _idle[key].append, code).atexit = False
+        code = copy.deepcopy(original)
+    # Copying takes time, too. `make` and the code must not refer to the owner, which would then
+    # exist for ever.
+    weakref.finalize(owner, idle.append, code).atexit = False
     return code
 
 
