@@ -52,7 +52,7 @@ def fit_file_to_request(
         path = path.resolve()
     if not may_extend(path, RESULTS):
         return _write_tables(path, wanted, [])
-    old, new = TableFile(path), {made.group: made for made in wanted}
+    old, new = TableFile(path), {table.group: table for table in wanted}
     stored = old.tables
     wanted_runs = _known_rows(new.get(RUNS))
     hashes = {row["scene"]: row["scene_hash"] for row in wanted_runs.values()}
@@ -70,53 +70,53 @@ def fit_file_to_request(
     merged: dict[str, TableSpec] = {}
     kept: list[tuple[str, str]] = []
     for group in dict.fromkeys((*stored, *new)):
-        before, made = stored.get(group), new.get(group)
-        base = made or stored[group]
+        before, requested = stored.get(group), new.get(group)
+        base = requested or stored[group]
         # Tables of a scene's arrays have no checksums; they follow below from the runs that stay.
         if "crc32" not in base.computed:
             continue
-        asked = _known_rows(made)
+        requested_rows = _known_rows(requested)
         rows = {
             run: row
             for run, row in _known_rows(before).items()
-            if run in asked
+            if run in requested_rows
             or (group, row["scene"], row.get("curve", row["method_name"])) not in replaced
         }
-        kept += [
-            (group, run) for run in rows if run not in asked or _is_same(rows[run], asked[run])
-        ]
-        rows |= asked
+        for run, row in rows.items():
+            if run not in requested_rows or _is_same(row, requested_rows[run]):
+                kept.append((group, run))
+        rows |= requested_rows
         if rows:
             runs = sorted(rows, key=row_order) if group == RUNS else list(rows)
             known = {
                 name: (column, [rows[run][name] for run in runs])
                 for name, (column, _) in base.known.items()
             }
-            columns = _joined(before, made)
+            columns = _joined(before, requested)
             merged[group] = TableSpec(group, runs, known, columns, base.attributes, base.characters)
     methods: dict[str, list[str]] = {}  # by scene
     if RUNS in merged:
         for run, scene in zip(merged[RUNS].runs, merged[RUNS].known["scene"][1], strict=True):
             methods.setdefault(scene, []).append(str(run).removeprefix(f"{scene}/"))
     for scene, own in methods.items():
-        before, made = stored.get(scene), new.get(scene)
+        before, requested = stored.get(scene), new.get(scene)
         # Arrays of a scene with other numbers are not taken over.
         if (
             before is not None
-            and made is not None
-            and before.attributes["scene_hash"] != made.attributes["scene_hash"]
+            and requested is not None
+            and before.attributes["scene_hash"] != requested.attributes["scene_hash"]
         ):
             before = None
-        base, columns = made or stored[scene], _joined(before, made)
+        base, columns = requested or stored[scene], _joined(before, requested)
         merged[scene] = TableSpec(scene, own, base.known, columns, base.attributes, base.characters)
     # The file is kept if it has these rows and columns, and none of its rows is dropped.
     is_same = merged.keys() == stored.keys() and all(
-        list(made.runs) == list(stored[group].runs)
-        and made.computed.keys() == stored[group].computed.keys()
-        for group, made in merged.items()
+        list(table.runs) == list(stored[group].runs)
+        and table.computed.keys() == stored[group].computed.keys()
+        for group, table in merged.items()
     )
     if is_same and len(kept) == sum(
-        len(made.runs) for made in stored.values() if "crc32" in made.computed
+        len(table.runs) for table in stored.values() if "crc32" in table.computed
     ):
         return old
     places = [(group, run, old.place(run, group)) for group, run in kept]
@@ -163,17 +163,20 @@ def _known_rows(table: TableSpec | None) -> Mapping[str, Mapping[str, Any]]:
     return {} if table is None else table.known_rows
 
 
-def _is_same(stored: Mapping[str, Any], asked: Mapping[str, Any]) -> bool:
+def _is_same(stored: Mapping[str, Any], requested: Mapping[str, Any]) -> bool:
     """Return whether a row is as it is requested; a missing number is NaN in both."""
-    return stored.keys() == asked.keys() and all(
-        value == asked[name] or (value != value and asked[name] != asked[name])
+    return stored.keys() == requested.keys() and all(
+        value == requested[name] or (value != value and requested[name] != requested[name])
         for name, value in stored.items()
     )
 
 
-def _joined(before: TableSpec | None, made: TableSpec | None) -> dict[str, Column]:
+def _joined(before: TableSpec | None, requested: TableSpec | None) -> dict[str, Column]:
     """Return the computed columns of two tables, the checksum last."""
-    columns = {**(before.computed if before else {}), **(made.computed if made else {})}
+    columns: dict[str, Column] = {}
+    for table in (before, requested):
+        if table is not None:
+            columns |= table.computed
     checksum = columns.pop("crc32", None)
     return columns if checksum is None else {**columns, "crc32": checksum}
 
@@ -197,11 +200,11 @@ def _write_tables(
     created = datetime.now(UTC).isoformat(timespec="seconds")
     count, scenes = 0, set[str]()
     others = sorted(
-        made.group for made in tables if made.group != RUNS and "crc32" in made.computed
+        table.group for table in tables if table.group != RUNS and "crc32" in table.computed
     )
-    for made in tables:
-        if made.group == RUNS:
-            count, scenes = len(made.runs), set(made.known["scene"][1])
+    for table in tables:
+        if table.group == RUNS:
+            count, scenes = len(table.runs), set(table.known["scene"][1])
     summary = f"runs: {count}, scenes: {len(scenes)}; trajectories, energies, status and errors"
     if others:
         summary += f"; tables {', '.join(others)}"
@@ -215,8 +218,8 @@ def _write_tables(
         "date_created": created,
     }
     with create_file(path, tables, attributes) as file:
-        for table in file.tables.values():
-            table.clear()
+        for stored in file.tables.values():
+            stored.clear()
         for group, run, values in rows:
             place = file.place(run, group)
             blank = blank_rows(1, place.row_type)
@@ -226,5 +229,5 @@ def _write_tables(
     # It is the same file under its name now.
     return TableFile(
         path,
-        laid_out_as=(attributes, [replace(table, path=path) for table in file.tables.values()]),
+        laid_out_as=(attributes, [replace(stored, path=path) for stored in file.tables.values()]),
     )
