@@ -16,7 +16,7 @@ from rotor_mbs.comparison.channels import Channel, channels
 from rotor_mbs.comparison.data import ForeignData
 from rotor_mbs.comparison.hypotheses import Explanation, Hypothesis, cheapest, explanations
 from rotor_mbs.comparison.verdict import ChannelErrors, agrees_until
-from rotor_mbs.models.lagrange.samples import LoadParts, partial_loads
+from rotor_mbs.models.lagrange.samples import LoadParts, sampled_loads
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import ALIGNMENT, ROTOR_TORQUE, values_before
 from rotor_mbs.solution.defects import FLOOR_SAFETY, Defects
@@ -162,7 +162,7 @@ def loads_by_frame(
         By frame, (n, components) N or N m in the order of `channels`. A load that has no components
         in a frame is given in its own.
     """
-    loads = partial_loads(scene, time, angles, rates, parts)
+    loads = sampled_loads(scene, time, angles, rates, parts)
     by_frame = {frame: dict(loads) for frame in _FRAMES}
     # One rotation after the other: from the blade's frame by the pitch to the coned one, by the
     # cone to the rotor's, by the azimuth to the shaft's, by the tilt to the base.

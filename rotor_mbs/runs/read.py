@@ -9,8 +9,8 @@ of their own.
 /bench                          a row per point of a curve: a method at one setting on a scene
 /stability                      a row per step of a ladder: a fixed-step method on a scene
 /modes/<scene>/<model>/<kind>   modes over speed, in a file of modes
-/comparison/<scene>/data/trajectory   data of another program and the reference at their times;
-modes: over speed
+/comparison/<scene>/data/trajectory   data of another program and the reference at their times
+/comparison/<scene>/data/modes        the same of modes, over speed
 """
 
 from __future__ import annotations

@@ -231,24 +231,6 @@ def constant_work(scene: Scene, angles: Array) -> Array:
     return work
 
 
-def sampled_loads(scene: Scene, times: Array, angles: Array, rates: Array) -> dict[str, Array]:
-    """Return the load quantities at the samples of a motion.
-
-    Parameters
-    ----------
-    scene : the rotor, its loads and gravity.
-    times : (n,) s.
-    angles, rates : (n, 1 + blades) rad and rad/s.
-
-    Returns
-    -------
-    dict of ndarray
-        As of `named_loads`, (n, ...) each; at a jump of a load, before it.
-    """
-    with np.errstate(all="ignore"):  # near a singularity; what is not finite cuts the run
-        return _loads(scene, times, angles, rates, float, np.sin, np.cos)
-
-
 @dataclass(frozen=True)
 class LoadParts:
     """Scale the terms that loads consist of: by 1 to keep a term, by 0 to leave it out.
@@ -265,17 +247,24 @@ class LoadParts:
     rates: float = 1.0
 
 
-def partial_loads(
-    scene: Scene, times: Array, angles: Array, rates: Array, parts: LoadParts
+def sampled_loads(
+    scene: Scene, times: Array, angles: Array, rates: Array, parts: LoadParts | None = None
 ) -> dict[str, Array]:
-    """Return the load quantities with some of their terms left out.
+    """Return the load quantities at the samples of a motion.
 
     Parameters
     ----------
-    scene, times, angles, rates : as of `sampled_loads`.
-    parts : the factor of each kind of term.
+    scene : the rotor, its loads and gravity.
+    times : (n,) s.
+    angles, rates : (n, 1 + blades) rad and rad/s.
+    parts : the factor of each kind of term; all are 1 where left out.
+
+    Returns
+    -------
+    dict of ndarray
+        As of `named_loads`, (n, ...) each; at a jump of a load, before it.
     """
-    with np.errstate(all="ignore"):
+    with np.errstate(all="ignore"):  # near a singularity; what is not finite cuts the run
         return _loads(scene, times, angles, rates, float, np.sin, np.cos, parts)
 
 
