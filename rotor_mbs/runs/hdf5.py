@@ -1,7 +1,7 @@
 """Read attributes, columns and values of groups with the HDF5 library, but not the rows.
 
-The files are of this program. The worker process of `runs.untrusted` loads this module, and
-nothing else of the package.
+The files are of this program. The worker process of `runs.untrusted` loads this module and what it
+imports, so that it starts fast.
 """
 
 from __future__ import annotations

@@ -129,8 +129,8 @@ def compiled(key: tuple[object, ...], make: Callable[[], Any], owner: object) ->
         code = idle.pop()
     except IndexError:
         code = copy.deepcopy(original)
-    # Copying takes time, too. `make` and the code must not refer to the owner, which would then
-    # exist for ever.
+    # A copy takes time, too, and is kept for the next owner. The code must not refer to its owner,
+    # which would then never be removed.
     weakref.finalize(owner, idle.append, code).atexit = False
     return code
 
