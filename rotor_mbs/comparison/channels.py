@@ -109,6 +109,13 @@ class Channel:
         """Return whether the channel is a component of a force or moment."""
         return self.kind in ("force", "moment")
 
+    @property
+    def own_frame(self) -> str:
+        """Return the frame in which a scene has this load, "" where it has no components."""
+        if self.name.startswith("blade root"):
+            return "blade"
+        return "base" if self.name.startswith("shaft") else ""
+
     def in_frame(self, frame: str) -> Channel:
         """Return the same component in another frame.
 
@@ -121,11 +128,7 @@ class Channel:
         InputError
             If the load has no components in this frame, or the channel is no load.
         """
-        own = ""
-        if self.name.startswith("blade root"):
-            own = "blade"
-        elif self.name.startswith("shaft"):
-            own = "base"
+        own = self.own_frame
         if frame == own:
             return self
         if not self.is_load or frame not in FRAMES.get(own, ()):

@@ -202,9 +202,9 @@ def _shaft_load(name: str, match: re.Match[str], by_name: Mapping[str, Channel])
 
 def _in_frame(channel: Channel, frames: Iterable[str]) -> Channel:
     """Return a load in the first of some frames in which it has components."""
-    own = "blade" if channel.name.startswith("blade root") else "base"
+    own = channel.own_frame
     for frame in frames:
-        if frame == own or frame in FRAMES[own]:
+        if frame == own or frame in FRAMES.get(own, ()):
             return channel.in_frame(frame)
     return channel
 
