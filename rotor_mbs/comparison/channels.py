@@ -322,6 +322,44 @@ def names_a_channel(name: str, known: Sequence[Channel]) -> bool:
     return False
 
 
+def arrays_of_other_length(
+    names: Sequence[str], known: Sequence[Channel], kind: str = ""
+) -> dict[str, str]:
+    """Return columns of an array of channels that has more or fewer columns than channels.
+
+    Parameters
+    ----------
+    names : of all columns of the data.
+    known : the channels that there may be.
+    kind : of the channels, "angle"; by default arrays of all kinds of coordinates count.
+
+    Returns
+    -------
+    dict of str
+        By name of the column the numbers of columns and of coordinates, in words.
+    """
+    reasons: dict[str, str] = {}
+    if known[0].name == SPEED:
+        return reasons
+    places = places_of(names)
+    for name in names:
+        entry, plain, width = entry_of(name), split_unit(name)[0], 1
+        array = plain
+        if entry is not None:
+            if plain[entry.end :].strip("_ .)\"'"):
+                continue
+            array, width = plain[: entry.start], places[name].columns
+        array = array.strip("_ .(\"'")
+        for array_kind in (kind,) if kind else tuple(_VECTORS):
+            if _array_name(array.rpartition("/")[2]) not in _VECTORS[array_kind]:
+                continue
+            count = sum(channel.kind == array_kind for channel in known)
+            if width != count:
+                columns = "1 column" if width == 1 else f"{width} columns"
+                reasons[name] = f"`{array}` has {columns}, the scene has {count} coordinates"
+    return reasons
+
+
 def _load_arrays(channel: Channel) -> tuple[str, ...]:
     """Return the names of arrays that a load may be a column of: of all blades, and of one."""
     if not channel.is_load:

@@ -20,6 +20,7 @@ from rotor_mbs.comparison.channels import (
     SPEED,
     TIME,
     Channel,
+    arrays_of_other_length,
     channel_from_name,
     channels,
     mode_channels,
@@ -192,17 +193,18 @@ def find_channels(table: DataTable, scene: Scene, mapping: DataMapping) -> Found
         has no numbers; if there is no time, or no angle or rate; of modes, no speed or frequency.
     """
     lines: list[str] = []
-    reasons_of_program: dict[str, str] = {}
+    other_reasons: dict[str, str] = {}
     if openfast.PROGRAM in (mapping.program, table.program):
         known = channels(scene)
-        suggestions, reasons_of_program = openfast.suggested(table, known, scene, mapping.openfast)
+        suggestions, other_reasons = openfast.suggested(table, known, scene, mapping.openfast)
         by_name = [_of_suggestion(suggestion) for suggestion in suggestions]
         lines.append(openfast.describe(mapping.openfast, is_guessed=not mapping.program))
     else:
         known, names = _known_channels(table, scene, mapping)
         by_name = [(channel, ColumnMapping(name, sign=channel.sign)) for channel, name in names]
+        other_reasons = arrays_of_other_length(list(table.columns), known)
     sources, reasons, loads_left_out = _sources(table, known, by_name, mapping)
-    reasons = {**reasons_of_program, **reasons}
+    reasons = {**other_reasons, **reasons}
     chosen: dict[Channel, ColumnMapping] = {}
     for channel in sorted(sources, key=lambda channel: channel.column):
         source = sources[channel]
@@ -225,7 +227,8 @@ def find_channels(table: DataTable, scene: Scene, mapping: DataMapping) -> Found
         if left_out.is_column and names_a_channel(name, known) and is_wanted and not is_chosen:
             raise table.refusal(name)
         unused[name] = left_out.reason
-    _refuse_missing(table, known[0], chosen)
+    suggested = [channel for channel, _ in by_name]
+    _refuse_missing(table, known, chosen, suggested, mapping)
     return FoundChannels(chosen, tuple(lines), unused, loads_left_out)
 
 
@@ -391,18 +394,63 @@ def _line(channel: Channel, source: ColumnMapping, *, is_assumed: bool) -> str:
 
 
 def _refuse_missing(
-    table: DataTable, first: Channel, chosen: Mapping[Channel, ColumnMapping]
+    table: DataTable,
+    known: Sequence[Channel],
+    chosen: Mapping[Channel, ColumnMapping],
+    suggested: Sequence[Channel],
+    mapping: DataMapping,
 ) -> None:
-    """Raise InputError if the time or speed is missing, or everything that is compared with it."""
+    """Raise InputError if the time or speed is missing, or everything that is compared with it.
+
+    Parameters
+    ----------
+    table : the columns.
+    known : the channels that there may be, the time or speed first.
+    chosen : the channels that are found, and their sources.
+    suggested : the channels that names of columns suggest, also those that are not wanted.
+    mapping : what is said of the columns.
+    """
+    first = known[0]
+    has_compared = any(_is_compared(channel, first) for channel in chosen)
+    if first in chosen and has_compared:
+        return
+    compared = ["frequency"] if first.name == SPEED else ["angle", "rate"]
+    if mapping.program and table.program != mapping.program:
+        # Names that are known without the program's: its own are read alone.
+        plain = [channel for channel, _ in _suggested(table, known)]
+        is_known = any(_is_compared(channel, first) for channel in plain)
+        if first in plain if first not in chosen else is_known:
+            problem = f'program = "{mapping.program}" reads the names of OpenFAST\'s output alone'
+            raise InputError(f"{table.source}: {problem}; allowed: leave `program` out")
     available = shown_names(list(table.columns))
     if first not in chosen:
         allowed = f"`{first.key}` in a mapping file"
         problem = f"no column for the {first.name}; available: {available}"
         raise InputError(f"{table.source}: {problem}; allowed: {allowed}")
-    if all(channel.is_load or channel == first for channel in chosen):
-        compared = "a frequency" if first.name == SPEED else "an angle or a rate"
-        problem = f"no column for {compared}; available: {available}"
-        raise InputError(f"{table.source}: {problem}; allowed: a mapping file (--columns)")
+    unwanted = [channel for channel in suggested if _is_compared(channel, first)]
+    if unwanted:
+        lists = []
+        if any(_is_one_of(channel, mapping.omitted) for channel in unwanted):
+            lists.append("`omit`")
+        if mapping.only:
+            lists.append("`only`")
+        verb = "leave" if len(lists) > 1 else "leaves"
+        problem = f"{' and '.join(lists)} {verb} no {' or '.join(compared)}"
+        keys_of_unwanted = shown_names([channel.key for channel in unwanted])
+        raise InputError(f"{table.source}: {problem}; allowed: one of {keys_of_unwanted}")
+    for kind in ("angle", "rate"):
+        other_lengths = arrays_of_other_length(list(table.columns), known, kind)
+        for reason in other_lengths.values():
+            raise InputError(f"{table.source}: {reason}; allowed: as many, rotor first")
+    problem = f"no column for a{'n' * (first.name != SPEED)} {' or a '.join(compared)}"
+    key = next(channel.key for channel in known if _is_compared(channel, first))
+    allowed = f"a mapping file (--columns) with `{key}` or others"
+    raise InputError(f"{table.source}: {problem}; available: {available}; allowed: {allowed}")
+
+
+def _is_compared(channel: Channel, first: Channel) -> bool:
+    """Return whether a channel is an angle, rate or frequency, beside the time or speed."""
+    return not channel.is_load and channel != first
 
 
 def _is_one_of(channel: Channel, names: Sequence[str]) -> bool:

@@ -90,7 +90,6 @@ def test_names_of_other_programs(case: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "names",
     [
-        ["q[1]", "q[2]", "q[3]"],  # one is missing, nobody knows which
         # more pitches than blades: the rotor may be among them
         ["theta[1]", "theta[2]", "theta[3]", "theta[4]"],
         ["psi_1", "psi_2", "psi_3"],  # azimuths of blades
@@ -102,6 +101,16 @@ def test_what_names_do_not_say_is_listed(names: list[str]) -> None:
     data = load_data(arrays, SCENE)
     assert data.columns == [0]
     assert dict(data.unused) == dict.fromkeys(names, "no channel has this name")
+
+
+def test_an_array_with_a_column_less_is_listed() -> None:
+    """Nobody knows which one is missing."""
+    names = ["q[1]", "q[2]", "q[3]"]
+    arrays = {"time": TIME, "rotor": ANGLES[:, 0]} | dict.fromkeys(names, TIME)
+    data = load_data(arrays, SCENE)
+    assert data.columns == [0]
+    reason = "`q` has 3 columns, the scene has 4 coordinates"
+    assert dict(data.unused) == dict.fromkeys(names, reason)
 
 
 @pytest.mark.parametrize(
