@@ -30,6 +30,7 @@ _FEW_DIGITS, _SURE_DIGITS, _ALL_DIGITS = 9, 14, 17
 _MAX_WRITTEN = 20_000  # numbers that are written with some digits, evenly chosen: 1 us each
 _ROUNDED_SINCE = 2.0 * 2.0**-52  # of a number
 _SINGLE_DIGITS = 8  # as many as single precision has
+_SINGLE = 2.0**-24  # its relative rounding error
 _MAX_EXCEPTIONS = 0.05  # of the numbers
 _MIN_DISTINCT = 10  # values: fewer may have been chosen, and say nothing of digits
 _SAMPLE = 200  # numbers of a column, at least, where not all are needed
@@ -56,6 +57,8 @@ class ForeignData:
     time_precision : of the times likewise, "" where that of the numbers matters more.
     notes : what was done to the rows.
     omitted : names of channels that are not to be missed.
+    restricted_to : names of the channels to which the mapping restricts the comparison; empty where
+        it does not.
     is_modes : whether it is a table of modes.
     """
 
@@ -73,6 +76,7 @@ class ForeignData:
     time_precision: str = ""
     notes: tuple[str, ...] = ()
     omitted: tuple[str, ...] = ()
+    restricted_to: tuple[str, ...] = ()
     is_modes: bool = False
 
     def rows(self, chosen: NDArray[np.bool_] | slice) -> ForeignData:
@@ -136,6 +140,9 @@ def load_data(
     if isinstance(data, str | os.PathLike):
         table = read_table(data, mapping.group, scene.name)
     elif hasattr(data, "items"):
+        if mapping.group:
+            problem = f"arrays have no groups, but the mapping has group = {mapping.group!r}"
+            raise InputError(f"data: {problem}; allowed: leave `group` out, or an HDF5 file")
         table = table_of("data", *arrays_of(data))
     else:
         allowed = 'a file, or arrays by name, such as {"time": run.time, "angles": run.angles}'
@@ -208,6 +215,7 @@ def data_of_table(
         time_precision=time_precision,
         notes=notes,
         omitted=mapping.omitted,
+        restricted_to=mapping.only,
         is_modes=is_modes,
     )
 
@@ -356,7 +364,7 @@ def rounding_of_printed(
         return last
     with np.errstate(over="ignore"):  # of what is larger than single precision can be
         single = np.asarray(judged, np.float32).astype(float)
-    precision = 2.0**-24 if np.array_equal(single, judged) else 2.0**-53
+    precision = _SINGLE if np.array_equal(single, judged) else 2.0**-53
     return np.asarray(sizes * precision)
 
 
@@ -373,8 +381,13 @@ def _precision(columns: Sequence[Array], rounding: Sequence[Array]) -> str:
         sizes = np.abs(values)
         if (last > 10.0**-_FEW_DIGITS * sizes).any():
             rounded.append((sizes, last))
+    if not rounded:
+        return ""
     digits = max(map(_significant_digits, columns))
-    if digits >= _SINGLE_DIGITS or not rounded:
+    if digits >= _SINGLE_DIGITS:
+        for sizes, last in rounded:
+            if sizes.any() and (last == sizes * _SINGLE).all():
+                return f"single precision: relative rounding error {_SINGLE:.0e}"
         return ""
     # Digits and decimals are the same for numbers of one size; they are named as decimals only if
     # sizes differ and nearly all numbers have the same rounding.
@@ -400,7 +413,7 @@ def _time_precision(time: Array, rounding: Array, *, is_equidistant: bool) -> st
     text = _precision([time], [rounding])
     if text or not (rounding > 2.0 * 2.0**-53 * np.abs(time)).any():
         return text
-    return "single precision"
+    return f"{_significant_digits(time)} digits"
 
 
 def _significant_digits(values: Array) -> int:

@@ -156,18 +156,22 @@ def read_columns(path: Path, group: str, scene: str) -> DataTable:
     with path.open("rb") as file:
         head = file.read(1024)
     source = str(path)
-    if head.startswith(_ZIP):
-        return table_of(source, _numpy_archive(path))
     # The version and the order of bytes stand at the end of MATLAB's text.
     is_matlab_73 = head.startswith(_MATLAB_73) and head[124:128] in (b"\x00\x02IM", b"\x02\x00MI")
+    # In files of MATLAB 7.3, 512 bytes of its own stand before the signature of HDF5.
+    is_hdf5 = head.startswith(_HDF5) or head[512:].startswith(_HDF5)
+    if group and (is_matlab_73 or not is_hdf5):
+        problem = f"a format without groups, but the mapping has group = {group!r}"
+        raise InputError(f"{path}: {problem}; allowed: leave `group` out, or an HDF5 file")
+    if head.startswith(_ZIP):
+        return table_of(source, _numpy_archive(path))
     if head.startswith(_MATLAB_5) or _is_matlab_4(head) or is_matlab_73:
         return table_of(source, _matlab(path, is_hdf5=is_matlab_73))
     if head.startswith(_NETCDF3):
         return _decoded(source, *_netcdf_3(path))
     if path.suffix.lower() == ".outb":
         return replace(table_of(source, *_openfast(path)), program="openfast")
-    # In files of MATLAB 7.3, 512 bytes of its own stand before the signature of HDF5.
-    if head.startswith(_HDF5) or head[512:].startswith(_HDF5):
+    if is_hdf5:
         return _hdf5(path, group, scene)
     if b"\x00" in head and not head.startswith(_UTF_16):
         raise InputError(f"{path}: not a format that can be read; allowed: {FORMATS}")

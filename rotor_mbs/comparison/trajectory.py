@@ -602,8 +602,14 @@ def _unchecked_parts(
         reason = f"the rows are too far apart, or {digits}, to be checked"
         yield "unchecked", f"after the horizon {reason}, {since}"
     missed = [name for name in errors.missing if name not in data.omitted]
-    if missed:
-        listed = ", ".join(f'"{name.replace(" ", "_")}"' for name in missed)
+    unwanted = [name for name in missed if data.restricted_to and name not in data.restricted_to]
+    if unwanted:
+        listed = ", ".join(f'"{channel_key(name)}"' for name in unwanted)
+        verb = "is" if len(unwanted) == 1 else "are"
+        allowed = f"{listed} in `only`, or omit = [{listed}], in a mapping file"
+        yield "unchecked", f"{', '.join(unwanted)} {verb} not in `only`; allowed: {allowed}"
+    elif missed:
+        listed = ", ".join(f'"{channel_key(name)}"' for name in missed)
         allowed = f"omit = [{listed}] in a mapping file"
         yield "unchecked", f"no column for {', '.join(missed)}; allowed: {allowed}"
 

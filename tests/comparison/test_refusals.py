@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from support.scenes import paper
 
+import rotor_mbs as rm
 from rotor_mbs.comparison.data import load_data
+from rotor_mbs.comparison.formats import read_in_worker
 from rotor_mbs.errors import InputError
 
 SCENE = paper("fig11", duration=1.0, samples=11)
@@ -49,6 +52,12 @@ REFUSALS: dict[str, tuple[dict[str, Any], dict[str, Any], str]] = {
         {},
         "data: `qd` has 1 column, the scene has 4 coordinates; allowed: as many, rotor first",
     ),
+    "arrays have no groups": (
+        {"time": TIME, **ANGLES},
+        {"group": "x"},
+        "data: arrays have no groups, but the mapping has group = 'x'; "
+        "allowed: leave `group` out, or an HDF5 file",
+    ),
     "unknown names": (
         {"time": TIME, "a": TIME},
         {"omit": ["pitch_3"]},
@@ -69,3 +78,37 @@ def test_the_message_has_the_reason(name: str) -> None:
 def test_an_array_of_another_length_beside_angles_is_unused_with_the_reason() -> None:
     data = load_data({"time": TIME, **ANGLES, "rates": np.ones((11, 2))}, SCENE)
     assert data.unused["rates[0]"] == "`rates` has 2 columns, the scene has 4 coordinates"
+
+
+@pytest.mark.parametrize("name", ["a.csv", "a.npz", "a.json", "a.nc"])
+def test_a_group_of_a_file_without_groups_is_refused(name: str, tmp_path: Path) -> None:
+    path = tmp_path / name
+    head = {
+        "a.csv": b"time,rotor\n0,1\n1,2\n",
+        "a.npz": b"PK\x03\x04",
+        "a.json": b"{",
+        "a.nc": b"CDF",
+    }
+    path.write_bytes(head[name])
+    with pytest.raises(
+        InputError, match="a format without groups, but the mapping has group = 'x'"
+    ):
+        read_in_worker((path, "x", SCENE.name))
+
+
+def test_numbers_of_single_precision_are_told() -> None:
+    single = {name: values.astype(np.float32) for name, values in ANGLES.items()}
+    text = "single precision: relative rounding error 6e-08"
+    assert load_data({"time": TIME, **single}, SCENE).precision == text
+    assert load_data({"time": TIME, **ANGLES, "rotor": single["rotor"]}, SCENE).precision == text
+    assert load_data({"time": TIME, **ANGLES}, SCENE).precision == ""
+
+
+def test_a_channel_that_only_leaves_out_is_told_from_a_missing_column() -> None:
+    run = rm.run(SCENE, "lagrange/dop853")
+    data = {"time": run.time, "angles": run.angles, "rates": run.rates}
+    only = ["rotor", "pitch_1", "pitch_3"]
+    comparison = rm.compare(data, SCENE, columns={"only": only})
+    allowed = '"pitch_2" in `only`, or omit = ["pitch_2"], in a mapping file'
+    assert comparison.message == f"pitch 2 is not in `only`; allowed: {allowed}"
+    assert rm.compare(data, SCENE, columns={"only": only, "omit": ["pitch_2"]}).status == "ok"
