@@ -129,6 +129,11 @@ class InputFile:
         allowed = kind.allowed.replace("{unit}", "")
         if not _NUMBER.fullmatch(text):
             raise self.problem(name, f"{text[:40]!a} is not a number", allowed)
+        values = self._entries[_plain(name)][1]
+        # Of "1,5", with a decimal comma, the first value is 1.
+        if len(values) > 1:
+            found = f"{len(values)} values, {', '.join(values)[:40]!a}"
+            raise self.problem(name, found, f"{allowed}, with a decimal point")
         try:
             read: float = kind.read(_as_number(text))
         except TableError as error:
@@ -204,11 +209,7 @@ class InputFile:
         rows = []
         for index in range(first, first + count):
             line = self.lines[index] if index < len(self.lines) else ""
-            row = []
-            for text in line.replace(",", " ").split():
-                if not _NUMBER.fullmatch(text):
-                    break
-                row.append(_as_number(text))
+            row = _numbers_of_row(line)
             if len(row) < width or not all(abs(number) <= keys.LARGEST for number in row):
                 place = f"{shown_path(self.path)}:{index + 1}"
                 problem = f"{what} {index - first + 1} of {count} is not {width} numbers"
@@ -248,6 +249,23 @@ def _split_line(line: str) -> tuple[str, list[str]]:
         else:
             break
     return "", []
+
+
+def _numbers_of_row(line: str) -> list[float]:
+    """Return the numbers that a row of a table begins with.
+
+    They are parted by blanks, or by commas with or without blanks. In a row that has blanks without
+    a comma, a comma within a number is a decimal comma: this is no number.
+    """
+    has_blanks = re.search(r"[^\s,]\s+[-+.\d]", line) is not None
+    words = line.split() if has_blanks else line.replace(",", " ").split()
+    row = []
+    for word in words:
+        number = word.strip(",")
+        if not _NUMBER.fullmatch(number):
+            break
+        row.append(_as_number(number))
+    return row
 
 
 def _as_number(text: str) -> float:

@@ -309,6 +309,20 @@ WRONG = [
         "TipRad",
         "'ten' is not a number; allowed: a number",
     ),
+    (
+        "OpenFAST 4.2",
+        {"HubRad": "1,5"},
+        "ElastoDyn.dat",
+        "HubRad",
+        "2 values, '1, 5'; allowed: a number of at least 0, with a decimal point",
+    ),
+    (
+        "OpenFAST 4.2",
+        {"NumBl": "3;1"},
+        "ElastoDyn.dat",
+        "NumBl",
+        "2 values, '3, 1'; allowed: a number, with a decimal point",
+    ),
     ("OpenFAST 4.2", {"TipRad": ""}, "ElastoDyn.dat", "", "no line named TipRad; allowed: "),
     (
         "OpenFAST 4.2",
@@ -403,6 +417,21 @@ def test_one_line_with_file_line_and_name(
         assert f"{file}:{number}: {name}: " in problem
     else:
         assert f"{file}: {message}" in problem
+
+
+def test_a_decimal_comma_in_a_table_is_refused_and_commas_between_columns_are_not(
+    tmp_path: Path,
+) -> None:
+    model = write_model(tmp_path)
+    (blade,) = tmp_path.rglob("blade.dat")
+    written, plain = blade.read_bytes(), rm.scene_from_openfast(model).text
+    *lines, first, second, third = written.split(b"\r\n")
+    with_commas = [row.replace(b"  ", b",") for row in (first, second, third)]
+    blade.write_bytes(b"\r\n".join([*lines, *with_commas]))
+    assert rm.scene_from_openfast(model).text == plain
+    blade.write_bytes(written.replace(b"13.3", b"13,3"))
+    with pytest.raises(InputError, match=r"blade.dat:\d+: station 1 of 3 is not \d numbers"):
+        rm.scene_from_openfast(model)
 
 
 @pytest.mark.parametrize(
