@@ -347,6 +347,26 @@ def toml_lines(table: Mapping[str, object]) -> str:
     return "".join(f"{key} = {toml_value(value)}\n" for key, value in table.items())
 
 
+# How the TOML reader's messages begin that are about a key or table of which there is one before.
+_SAYS_TWICE = ("Cannot overwrite", "Cannot declare", "Cannot mutate", "Cannot redefine")
+
+
+def _repeated_key(text: str, line: int) -> str:
+    """Return which key is there twice, and its first line; "" where none is found.
+
+    Parameters
+    ----------
+    text, line : that is no TOML, and the last line of the key that is there a second time.
+    """
+    located = list(_located("\n".join(text.split("\n")[:line])))
+    path, own_line, _ = located[-1]
+    for length in range(len(path), 0, -1):
+        for known, first_line, _ in located:
+            if known == path[:length] and first_line < own_line:
+                return f"{shown_key(known)} is there twice, first in line {first_line}"
+    return ""
+
+
 def _syntax_error(message: str, text: str) -> str:
     """Return an error of the TOML reader in the form of this package's messages.
 
@@ -366,6 +386,8 @@ def _syntax_error(message: str, text: str) -> str:
     else:
         reason, place = message.removesuffix(" (at end of document)"), "end of file"
         line = text.rstrip().count("\n") + 1
+    if reason.startswith(_SAYS_TWICE) and (twice := _repeated_key(text, line)):
+        return f"{line}: not TOML: {twice}"
     reason = reason[:1].lower() + reason[1:120]
     return f"{line}: not TOML: {reason if reason.isprintable() else ascii(reason)} ({place})"
 
@@ -384,6 +406,19 @@ def find_lines(text: str) -> dict[KeyPath, int]:
         inline tables are not in it.
     """
     lines: dict[KeyPath, int] = {}
+    for path, line, value in _located(text):
+        lines.setdefault(path, line)
+        _number_entries(path, value, lines)
+    return lines
+
+
+def _located(text: str) -> Iterator[tuple[KeyPath, int, Sequence[tuple[str, int]]]]:
+    """Yield each key and each table on the way to it, its line and the tokens of its value.
+
+    Parameters
+    ----------
+    text : the content of a TOML file; see `find_lines`.
+    """
     table_counts: dict[KeyPath, int] = {}  # of every array of tables
     table: KeyPath = ()
     for statement in _statements(text):
@@ -392,21 +427,21 @@ def find_lines(text: str) -> dict[KeyPath, int]:
         of_array = tokens[:2] == ["[", "["]
         end = tokens.index("=") if "=" in tokens else len(tokens)
         path = () if is_header else table
+        line = statement[0][1]
         # Escapes in a quoted key are left as they are: its line is then the one of the table around
         # it.
         names = [(token, line) for token, line in statement[:end] if token not in _MARKS]
         for i, (name, line) in enumerate(names):
             path = (*path, name[1:-1] if name[0] in "\"'" else name)
-            lines.setdefault(path, line)
+            yield path, line, ()
             if of_array and i == len(names) - 1:
                 table_counts[path] = table_counts.get(path, 0) + 1
             if is_header and path in table_counts:
                 path = (*path, table_counts[path] - 1)
-                lines.setdefault(path, line)
+                yield path, line, ()
         if is_header:
             table = path
-        _number_entries(path, statement[end + 1 :], lines)
-    return lines
+        yield path, line, statement[end + 1 :]
 
 
 def _statements(text: str) -> Iterator[list[tuple[str, int]]]:
