@@ -31,7 +31,6 @@ from rotor_mbs.scenario.keys import (
     list_of,
     read_each,
     restricted,
-    within,
 )
 from rotor_mbs.scenario.time_table import (
     LoadTable,
@@ -281,18 +280,21 @@ _INERTIA = restricted(
     "six numbers xx yy zz xy xz yz{unit} that a rigid body can have",
     f"no rigid body has this inertia: {_NOT_RIGID}",
 )
-_TILT = within(
-    keys.SIZE,
-    at_least=-0.5 * math.pi,
-    at_most=0.5 * math.pi,
-    allowed="a number{unit} from -pi/2 to pi/2",
-)
+
+
+def _read_lean(most: float, value: object) -> float:
+    """Return an angle from -most to most, rad. Raises TableError, which says if degrees fit."""
+    angle: float = keys.SIZE.read(value)
+    if abs(angle) <= most:
+        return angle
+    advice = _degrees_meant(angle) if math.radians(abs(angle)) <= most else ""
+    raise invalid(f"{as_text(value)} is out of range{advice}")
+
+
+_TILT = Kind(functools.partial(_read_lean, 0.5 * math.pi), "a number{unit} from -pi/2 to pi/2")
 # At a right angle the pitch axis would be the shaft itself.
-_CONE = within(
-    keys.SIZE,
-    at_least=-MAX_CONE,
-    at_most=MAX_CONE,
-    allowed=f"a number{{unit}} from -{MAX_CONE:g} to {MAX_CONE:g}",
+_CONE = Kind(
+    functools.partial(_read_lean, MAX_CONE), f"a number{{unit}} from -{MAX_CONE:g} to {MAX_CONE:g}"
 )
 _LOAD = Kind(_read_load, "a number{unit}, or rows [t, number] with t >= 0 s", over_time=True)
 _ANGLES = Kind(
@@ -1329,7 +1331,7 @@ def _implausible_hub(scene: Scene) -> list[str]:
 
 def _as_wide_angle(angle: float) -> str:
     """Return the advice for a tilt or cone (rad) that is far above that of real rotors."""
-    return f'{angle:g} rad are {math.degrees(angle):.3g} degrees; degrees? write "deg({angle:g})"'
+    return f"{angle:g} rad are {math.degrees(angle):.3g} degrees{_degrees_meant(angle)}"
 
 
 def _implausible_motion(scene: Scene) -> list[str]:
@@ -1352,15 +1354,25 @@ def _implausible_motion(scene: Scene) -> list[str]:
             lines.append(f"bearing.rest[{i}]: {_as_degrees(rest)}")
     for i, rate in enumerate(scene.initial_rates):
         if abs(rate) > MAX_RATE:
-            advice = f'degrees per second? write "deg({rate:g})"'
-            lines.append(f"initial.rates[{i}]: {rate:g} rad/s; {advice}")
+            advice = _degrees_meant(rate, "degrees per second")
+            lines.append(f"initial.rates[{i}]: {rate:g} rad/s{advice}")
     return lines
 
 
 def _as_degrees(angle: float) -> str:
     """Return the advice for an angle (rad) that seems to be in degrees."""
     turns = round(abs(angle) / TURN, 1)
-    return f'{angle:g} rad are {turns:.6g} turns; degrees? write "deg({angle:g})"'
+    return f"{angle:g} rad are {turns:.6g} turns{_degrees_meant(angle)}"
+
+
+def _degrees_meant(number: float, unit: str = "degrees") -> str:
+    """Return the advice for a number that seems to be in degrees.
+
+    It is "" for one of more than six digits: it was computed, by deg(x) or from pi.
+    """
+    if float(f"{number:.6g}") != number:
+        return ""
+    return f'; {unit}? write "deg({number:g})"'
 
 
 def _implausible_blade(name: str, blade: Blade) -> list[str]:

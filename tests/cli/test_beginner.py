@@ -8,7 +8,7 @@ import pytest
 from support.commands import refusal, rotor_mbs
 
 import rotor_mbs as rm
-from rotor_mbs.errors import PlausibilityWarning
+from rotor_mbs.errors import InputError, PlausibilityWarning
 from rotor_mbs.scenario.catalogue import list_scenes
 from rotor_mbs.scenario.scene import implausible_values, new_scene_text
 
@@ -132,6 +132,31 @@ def test_a_number_that_looks_like_a_slip_is_warned_of_and_not_refused(
 
 def test_plausible_numbers_are_not_warned_of(folder: Path) -> None:
     assert rotor_mbs("show", scene_file(folder, {})).err == ""
+
+
+def test_an_angle_that_was_computed_is_not_advised_to_be_written_in_degrees(folder: Path) -> None:
+    text = new_scene_text().replace('"deg(30)"', '"deg(400)"', 1)
+    text = text.replace("rates = [0,", 'rates = ["deg(7000)",', 1)
+    text = text.replace("tilt = 0.0", 'tilt = "deg(90)"', 1)
+    path = folder / "mine.toml"
+    path.write_text(text, encoding="utf-8")
+    lines = rotor_mbs("show", path).err.splitlines()
+    assert [line.rpartition(": ")[2] for line in lines] == [
+        "6.98132 rad are 1.1 turns",
+        "122.173 rad/s",
+        "1.5708 rad are 90 degrees",
+    ]
+
+
+@pytest.mark.parametrize(("key", "number"), [("shaft.tilt", -5), ("blade.cone", 5)])
+def test_a_lean_out_of_range_that_is_one_in_degrees_is_advised_to_be_written_so(
+    key: str, number: int
+) -> None:
+    scene = rm.scene("paper/fig11")
+    with pytest.raises(InputError, match=rf'out of range; degrees\? write "deg\({number}\)"; allo'):
+        scene.replace(**{key: number})
+    with pytest.raises(InputError, match="200 is out of range; allowed: "):
+        scene.replace(**{key: 200})
 
 
 def test_all_angles_in_degrees_are_named_and_rest_angles_and_inertias_in_other_units() -> None:
