@@ -116,7 +116,8 @@ def up_to(value: float | None, digits: int = 2) -> str:
 def span(low: float, high: float, digits: int = 3, unit: str = "") -> str:
     """Return a range, both ends to the digits of the larger one.
 
-    A number that is much smaller than the larger end is thus written as zero.
+    A number that is much smaller than the larger end is thus written as zero. Where both ends are
+    written alike it is one number.
 
     Parameters
     ----------
@@ -126,15 +127,24 @@ def span(low: float, high: float, digits: int = 3, unit: str = "") -> str:
 
     Examples
     --------
-    >>> span(-0.00189, 1.75), span(-11.46, 11.2, unit="°")
-    ('0 to 1.75', '−11.5° to 11.2°')
+    >>> span(-0.00189, 1.75), span(-11.46, 11.2, unit="°"), span(0.8249, 0.8251)
+    ('0 to 1.75', '−11.5° to 11.2°', '0.825')
     """
     largest = max(abs(low), abs(high))
     ends = [low, high]
     if largest > 0.0 and math.isfinite(largest):
         step = 10.0 ** (math.floor(math.log10(largest)) - digits + 1)
         ends = [round(value / step) * step for value in ends]
-    return " to ".join(f"{number(value, digits)}{unit}" for value in ends)
+    return text_range(*(f"{number(value, digits)}{unit}" for value in ends))
+
+
+def text_range(low: str, high: str) -> str:
+    """Return a range of two numbers that are text already; one where both are written alike.
+
+    >>> text_range("0.824", "0.825"), text_range("0.825", "0.825")
+    ('0.824 to 0.825', '0.825')
+    """
+    return low if low == high else f"{low} to {high}"
 
 
 def shortest(value: float) -> str:

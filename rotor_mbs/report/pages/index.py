@@ -33,6 +33,7 @@ from rotor_mbs.report.numbers import (
     in_words,
     number,
     prefixed,
+    text_range,
     typeset_title,
     with_unit,
 )
@@ -566,7 +567,7 @@ def own_table(report: Report, scenes: Sequence[StoredScene]) -> PageTable:
             row.append(
                 TableCell(
                     "",
-                    note=f"{number(low, 3)} to {number(high, 3)} {unit}",
+                    note=f"{text_range(number(low, 3), number(high, 3))} {unit}",
                     picture=picture,
                     order=high,
                 )

@@ -37,7 +37,15 @@ from rotor_mbs.report.elements import (
     TableCell,
 )
 from rotor_mbs.report.looks import BLUE, GREY, VERMILLION, Look, coordinate_look
-from rotor_mbs.report.numbers import NOTHING, SPACE, in_words, number, typeset_title, up_to
+from rotor_mbs.report.numbers import (
+    NOTHING,
+    SPACE,
+    in_words,
+    number,
+    text_range,
+    typeset_title,
+    up_to,
+)
 from rotor_mbs.report.pages import is_wide
 from rotor_mbs.scenario.keys import counted
 from rotor_mbs.solution.trajectory import Array
@@ -238,11 +246,8 @@ def mode_answer(scene: SceneModes) -> list[Markup]:
                 'Under gravity its rotation is <span class="bad">unstable at {} of {} '
                 "speeds</span>, {}."
             )
-            where = (
-                f"{number(float(unstable.min()), 3)} to "
-                f"{number(float(unstable.max()), 3)}{SPACE}rad/s"
-            )
-            sentences.append(text.format(len(unstable), known_count, where))
+            where = text_range(number(float(unstable.min()), 3), number(float(unstable.max()), 3))
+            sentences.append(text.format(len(unstable), known_count, f"{where}{SPACE}rad/s"))
         elif known_count:
             every = "all" if known_count == len(table.speeds) else f"{known_count} of"
             text = Markup("Under gravity its rotation is <b>stable at {} {} speeds</b>, up to {}.")
@@ -270,14 +275,14 @@ def _facts(scene: SceneModes) -> list[Fact]:
     rotation = _first(scene.rotation)
     if rotation is not None and len(rotation.speeds) > 1:
         low, high = float(rotation.speeds[0]), float(rotation.speeds[-1])
-        rpm = f"{number(low * 60.0 / _TURN, 3)} to {number(high * 60.0 / _TURN, 3)} rev/min"
-        facts.append(Fact("Rotor speeds", f"{number(low, 3)} to {number(high, 3)} rad/s", rpm))
+        speeds = text_range(number(low, 3), number(high, 3))
+        rpm = text_range(number(low * 60.0 / _TURN, 3), number(high * 60.0 / _TURN, 3))
+        facts.append(Fact("Rotor speeds", f"{speeds} rad/s", f"{rpm} rev/min"))
         damped = rotation.damping_ratios[np.isfinite(rotation.damping_ratios)]
         if len(damped) and float(np.abs(damped).max()) > _NOTHING:
             low, high = float(damped.min()), float(damped.max())
-            facts.append(
-                Fact("Damping ratio", f"{_shown(low, 3)} to {_shown(high, 3)}", "over all speeds")
-            )
+            ratios = text_range(_shown(low, 3), _shown(high, 3))
+            facts.append(Fact("Damping ratio", ratios, "over all speeds"))
     if scene.floquet is not None and np.isfinite(scene.floquet.largest).any():
         largest = float(np.nanmax(scene.floquet.largest))
         is_bad = bool((scene.floquet.stable == 0).any())

@@ -455,6 +455,8 @@ def own_answer(scene: StoredScene, run: StoredRun | None) -> list[Markup]:
             text = Markup("In {} the rotor moves between <b>{}° and {}°</b>").format(
                 whole, low, high
             )
+            if low == high:
+                text = Markup("For {} the rotor stays at <b>{}°</b>").format(whole, low)
         if "rates" in run:
             speed = run.array("rates")[:, 0]
             text += Markup(", at {} rad/s").format(span(float(speed.min()), float(speed.max())))

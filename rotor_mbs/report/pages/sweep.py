@@ -39,7 +39,7 @@ from rotor_mbs.report.elements import (
 )
 from rotor_mbs.report.files import MAX_NUMBERS
 from rotor_mbs.report.looks import BLUE, Look, coordinate_look, step_look, with_capital
-from rotor_mbs.report.numbers import number, prefix_of, shortest, typeset_title
+from rotor_mbs.report.numbers import number, prefix_of, shortest, text_range, typeset_title
 from rotor_mbs.report.pages import is_wide, words_of
 from rotor_mbs.report.pages.scene_plots import Jumps, blade_look, jumps_of
 from rotor_mbs.runs.rows import text_of
@@ -426,9 +426,8 @@ def _facts(sweep: _Sweep, quantities: Sequence[RunQuantity]) -> list[Fact]:
         values = sweep.parameters[key]
         low, high = brief(values.min()), brief(values.max())
         note = f"{len(np.unique(values))} values"
-        facts.append(
-            Fact(with_capital(field_name(key)), f"{low} to {high} {sweep.unit(key)}".rstrip(), note)
-        )
+        shown = f"{text_range(low, high)} {sweep.unit(key)}".rstrip()
+        facts.append(Fact(with_capital(field_name(key)), shown, note))
     for quantity in quantities[: 4 - len(facts)]:
         known = quantity.values[np.isfinite(quantity.values)]
         ends = (
@@ -782,7 +781,7 @@ def _faults_section(sweep: _Sweep, *, with_links: bool) -> Section:
         for key in sweep.varied[:4]:
             values = sweep.parameters[key][runs]
             low, high = brief(values.min()), brief(values.max())
-            row.append(low if low == high else f"{low} to {high}")
+            row.append(text_range(low, high))
         # The example of a group is the run with the largest defect.
         sizes = np.asarray(sweep.stored.column("defect_max"))[runs]
         worst = runs[int(np.nan_to_num(sizes, nan=-1.0).argmax())]
