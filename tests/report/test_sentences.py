@@ -350,6 +350,19 @@ def test_modes_that_do_not_satisfy_their_equations_are_told_of_one_model_too(
     assert (page.facts[0].value, page.facts[0].note) == ("✗ not their equations", fault)
 
 
+def test_facts_of_modes_have_the_digits_of_the_sentence_and_say_of_which_modes_they_are(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(SceneModes, "faults", property(lambda _: []))
+    monkeypatch.setattr(SceneModes, "disagreement", 4.51e-13)
+    bearing = {"stiffness": 1e4, "damping": 10.0}
+    page = modes_page([compute_modes(paper("fig11").replace(bearing=bearing), [0.5, 1.0])])
+    facts = {fact.name: fact for fact in page.facts}
+    assert "agree within <b>4.6×10⁻¹³</b>" in str(page.answer[0])
+    assert facts["Models"].note == "4; difference 4.6×10⁻¹³ of the largest eigenvalue"
+    assert facts["Damping ratio"].note == "in rotation without gravity, over all speeds"
+
+
 def test_axes_of_modes_are_named_by_their_scenes(tmp_path: Path) -> None:
     modes = [compute_modes(paper(name), [0.5, 1.0]) for name in ("fig11", "fig12")]
     for of_page, names in (

@@ -212,14 +212,12 @@ def mode_answer(scene: SceneModes) -> list[Markup]:
     for fault in scene.faults:
         sentences.append(Markup('<span class="bad">{}: {}</span>.').format(scene.label, fault))
     if models > 1:
-        how = Markup("agree within <b>{}</b> of the largest eigenvalue").format(
-            up_to(scene.disagreement)
-        )
+        how = Markup("agree within <b>{}</b> of the largest eigenvalue")
         if scene.disagreement > AGREEMENT:
             how = Markup(
                 '<span class="bad">do not agree: they differ by {} of the largest eigenvalue</span>'
             )
-            how = how.format(number(scene.disagreement))
+        how = how.format(_difference(scene))
         sentences.append(
             Markup("{}: the modes of {} models {}.").format(scene.label, in_words(models), how)
         )
@@ -256,6 +254,12 @@ def mode_answer(scene: SceneModes) -> list[Markup]:
     return sentences
 
 
+def _difference(scene: SceneModes) -> str:
+    """Return the largest difference of the models; rounded up where they agree within it."""
+    size = scene.disagreement
+    return number(size) if size > AGREEMENT else up_to(size)
+
+
 def _facts(scene: SceneModes) -> list[Fact]:
     """Return the facts at the top of the page: models, speeds, damping, and largest modulus.
 
@@ -265,7 +269,7 @@ def _facts(scene: SceneModes) -> list[Fact]:
     """
     facts = []
     models = max(len(scene.rest), len(scene.rotation))
-    note = f"{models}; difference {number(scene.disagreement)} of the largest eigenvalue"
+    note = f"{models}; difference {_difference(scene)} of the largest eigenvalue"
     if scene.faults:
         facts.append(Fact("Models", "✗ not their equations", scene.faults[0], "bad"))
     elif models > 1 and scene.agrees:
@@ -282,7 +286,8 @@ def _facts(scene: SceneModes) -> list[Fact]:
         if len(damped) and float(np.abs(damped).max()) > _NOTHING:
             low, high = float(damped.min()), float(damped.max())
             ratios = text_range(_shown(low, 3), _shown(high, 3))
-            facts.append(Fact("Damping ratio", ratios, "over all speeds"))
+            note = "in rotation without gravity, over all speeds"
+            facts.append(Fact("Damping ratio", ratios, note))
     if scene.floquet is not None and np.isfinite(scene.floquet.largest).any():
         largest = float(np.nanmax(scene.floquet.largest))
         is_bad = bool((scene.floquet.stable == 0).any())
