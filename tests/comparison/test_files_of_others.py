@@ -227,8 +227,8 @@ def test_unsigned_integers_of_netcdf_3_are_read(tmp_path: Path) -> None:
         file.createDimension("time", 2)
         angle = file.createVariable("angle", "i2", ("time",))
         angle[:] = [-2, 3]
-        angle._Unsigned = "true"
-        angle.scale_factor = 0.5
+        for name, value in {"_Unsigned": "true", "scale_factor": 0.5}.items():
+            setattr(angle, name, value)
     np.testing.assert_array_equal(read_in_worker((path, "", ""))["angle"].values, [32767.0, 1.5])
 
 
