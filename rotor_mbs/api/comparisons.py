@@ -28,7 +28,7 @@ from rotor_mbs.runs.read import Record, read_records, write_records
 from rotor_mbs.runs.trailer import COMPARISON
 from rotor_mbs.runs.versions import machine, versions
 from rotor_mbs.scenario.catalogue import scene_of
-from rotor_mbs.scenario.keys import as_float, positive
+from rotor_mbs.scenario.keys import as_float, counted, positive
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.toml_file import file_path
 
@@ -196,7 +196,7 @@ class DataComparison:
         verdict = self.verdict
         lines = [
             (
-                f"{verdict.source}: {verdict.rows} rows against "
+                f"{verdict.source}: {counted(verdict.rows, 'row')} against "
                 f"{self.record.attributes.get('scene_label', verdict.scene)}"
             ),
             *map("  {}".format, verdict.read),

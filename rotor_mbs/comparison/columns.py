@@ -30,11 +30,14 @@ class DataColumn(NamedTuple):
     values : (n,) as they stand in the file, NaN where one is missing.
     unit : that the file states, "" where it states none.
     step : between numbers that are packed as integers, in the same unit; 0 where they are not.
+    missing : what stands in place of the first number that is missing, and where, in words: "empty
+        in row 2 of 9 (line 3)"; "" where the file's own text is not known.
     """
 
     values: NDArray[np.float64]
     unit: str = ""
     step: float = 0.0
+    missing: str = ""
 
 
 class LeftOut(NamedTuple):
@@ -60,12 +63,15 @@ class DataTable:
     columns : by name, in the order of the file.
     left_out : by name what else is in the file.
     program : that wrote the file, as its head says: "openfast", or "".
+    headers : by the name of a column that has another one in the file, as an earlier column has it:
+        that name.
     """
 
     source: str
     columns: Mapping[str, DataColumn]
     left_out: Mapping[str, LeftOut] = field(default_factory=dict)
     program: str = ""
+    headers: Mapping[str, str] = field(default_factory=dict)
 
     def __getitem__(self, name: str) -> DataColumn:
         """Return the column with a name.
@@ -90,7 +96,7 @@ class DataTable:
     def refusal(self, name: str) -> InputError:
         """Return the error for a column that is needed and has no numbers."""
         column = f"column {name!r}: {self.left_out[name].reason}"
-        return InputError(f"{self.source}: {column}; allowed: numbers, a row for every time")
+        return InputError(f"{self.source}: {column}; allowed: real numbers, a row for every time")
 
 
 def arrays_of(data: Any) -> tuple[dict[str, Any], dict[str, str]]:
@@ -257,7 +263,9 @@ def _numbers(values: Any) -> tuple[NDArray[Any], str]:
         return seconds, "s"
     if array.dtype.kind == "O":
         return _numbers_of_objects(array), ""
-    names = {"M": "dates", "b": "true or false", "c": "complex numbers", "V": "records"}
+    names = {"M": "dates", "b": "true or false", "V": "records"}
+    if array.dtype.kind == "c":
+        raise _NotNumbersError("complex numbers", is_column=array.ndim > 0)
     if array.dtype.kind in names:
         raise _NotNumbersError(f"{names[array.dtype.kind]}, no numbers", is_column=array.ndim > 0)
     if array.ndim == 0 or not array.size:

@@ -23,6 +23,7 @@ from rotor_mbs.comparison.mapping import ColumnMapping, DataMapping, find_channe
 from rotor_mbs.comparison.times import ordered_rows, rounding_of_steps
 from rotor_mbs.comparison.units import unit_factor
 from rotor_mbs.errors import InputError
+from rotor_mbs.scenario.keys import counted
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.trajectory import Array
 
@@ -231,7 +232,10 @@ def _refuse_different_lengths(table: DataTable, sources: Mapping[Channel, Column
     for source in sources.values():
         lengths[source.column] = len(table[source.column].values)
     if len(set(lengths.values())) > 1:
-        shown = ", ".join(f"{name} has {length} rows" for name, length in lengths.items())
+        counts = []
+        for name, length in lengths.items():
+            counts.append(f"{name} has {counted(length, 'row')}")
+        shown = ", ".join(counts)
         problem = f"columns of different lengths: {shown}"
         raise InputError(f"{table.source}: {problem}; allowed: a row for every time")
 
@@ -256,7 +260,10 @@ def _si_values(table: DataTable, channel: Channel, source: ColumnMapping) -> Arr
     bad = np.flatnonzero(~np.isfinite(si_values))
     if len(bad):
         place = f"in row {bad[0] + 1} of {len(values)}"
-        problem = f"column {source.column!r} is {values[bad[0]]} {place}"
+        what = f"{values[bad[0]]} {place}"
+        if np.isnan(values[bad[0]]):
+            what = table[source.column].missing or what
+        problem = f"column {source.column!r} is {what}"
         raise InputError(f"{table.source}: {problem}; allowed: finite numbers")
     return si_values
 

@@ -111,8 +111,12 @@ def read_in_worker(arguments: tuple[Path, str, str]) -> DataTable:
             table = read_columns(path, group, scene)
         columns = {}
         for label, column in _short_names(table.columns).items():
-            columns[label] = DataColumn(column.values, column.unit[:MAX_NAME], column.step)
-        return DataTable(table.source, columns, _short_names(table.left_out), table.program)
+            columns[label] = column._replace(unit=column.unit[:MAX_NAME])
+        headers = {}
+        for label, header in table.headers.items():
+            headers[label] = header[:MAX_NAME]
+        left_out = _short_names(table.left_out)
+        return replace(table, columns=columns, left_out=left_out, headers=_short_names(headers))
     except RotorError as exc:
         problems = [line[:_MAX_PROBLEM] for line in str(exc).splitlines()]
     except MemoryError:
@@ -164,7 +168,10 @@ def read_columns(path: Path, group: str, scene: str) -> DataTable:
         problem = f"a format without groups, but the mapping has group = {group!r}"
         raise InputError(f"{path}: {problem}; allowed: leave `group` out, or an HDF5 file")
     if head.startswith(_ZIP):
-        return table_of(source, _numpy_archive(path))
+        arrays, objects = _numpy_archive(path)
+        table = table_of(source, arrays)
+        left_out = {name: LeftOut("an array of Python objects", True) for name in objects}
+        return replace(table, left_out={**table.left_out, **left_out})
     if head.startswith(_MATLAB_5) or _is_matlab_4(head) or is_matlab_73:
         return table_of(source, _matlab(path, is_hdf5=is_matlab_73))
     if head.startswith(_NETCDF3):
@@ -182,7 +189,8 @@ def read_columns(path: Path, group: str, scene: str) -> DataTable:
         text = content.decode("latin-1")
     del content
     if _is_json(text):
-        return table_of(source, *_json(text))
+        table = table_of(source, *_json(text))
+        return table if "NaN" in text else _with_nulls(table)
     return _read_text(source, text)
 
 
@@ -193,7 +201,7 @@ def _refuse_large(path: Path, size: float) -> None:
         raise InputError(f"{path}: its arrays claim {size / 2**30:.1f} GB; allowed: {allowed}")
 
 
-def _numpy_archive(path: Path) -> Arrays:
+def _numpy_archive(path: Path) -> tuple[Arrays, list[str]]:
     """Read the arrays of an .npz file.
 
     Parameters
@@ -202,8 +210,8 @@ def _numpy_archive(path: Path) -> Arrays:
 
     Returns
     -------
-    dict
-        Arrays by name; for an array of objects a list of texts, which `table_of` leaves out.
+    dict, list of str
+        Arrays by name; names of arrays of Python objects, which are not read.
 
     Raises
     ------
@@ -214,6 +222,7 @@ def _numpy_archive(path: Path) -> Arrays:
     with zipfile.ZipFile(path) as entries:
         _refuse_large(path, sum(entry.file_size for entry in entries.infolist()))
     arrays: dict[str, Any] = {}
+    objects: list[str] = []
     with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
         for name in archive.files:
             try:
@@ -221,8 +230,8 @@ def _numpy_archive(path: Path) -> Arrays:
             except ValueError as exc:
                 if "allow_pickle" not in str(exc):
                     raise
-                arrays[name] = ["objects of Python"] * 2  # pickles, which are programs
-    return arrays
+                objects.append(name)  # pickles, which are programs
+    return arrays, objects
 
 
 # MAT files
@@ -266,7 +275,7 @@ def _matlab(path: Path, *, is_hdf5: bool) -> Arrays:
     Raises
     ------
     RotorError
-        If the arrays claim more than `MAX_BYTES`.
+        If the file is damaged, or its arrays claim more than `MAX_BYTES`.
     """
     from pymatreader import read_mat  # late: 0.2 s
     from scipy.io import whosmat
@@ -275,11 +284,16 @@ def _matlab(path: Path, *, is_hdf5: bool) -> Arrays:
         from rotor_mbs.runs.arrays import refuse_claims
 
         refuse_claims(path, MAX_BYTES)
-    else:
-        # The heads of the arrays alone are unpacked for this, not those of structures and cells.
-        shapes = [shape for _, shape, kind in whosmat(path) if kind in _MATLAB_NUMBERS]
-        _refuse_large(path, sum(8.0 * math.prod(shape) for shape in shapes))
-    content = read_mat(str(path))
+    try:
+        if not is_hdf5:
+            # The heads of the arrays alone are unpacked for this, not structures and cells.
+            shapes = [shape for _, shape, kind in whosmat(path) if kind in _MATLAB_NUMBERS]
+            _refuse_large(path, sum(8.0 * math.prod(shape) for shape in shapes))
+        content = read_mat(str(path))
+    except (RotorError, MemoryError, RecursionError):
+        raise
+    except Exception as exc:  # what SciPy raises for a damaged file may be anything
+        raise InputError(f"{path}: not a MAT file that can be read; allowed: {FORMATS}") from exc
     names = [name for name in content if not (name.startswith("__") or name == "#refs#")]
     return dict(_parts("", {name: content[name] for name in names}))
 
@@ -575,6 +589,18 @@ def _json(text: str) -> tuple[Arrays, Units]:
     return dict(_parts("", content)), {}
 
 
+def _with_nulls(table: DataTable) -> DataTable:
+    """Return the columns of JSON, with null as what stands in place of a missing number."""
+    columns = {}
+    for name, column in table.columns.items():
+        is_missing = np.isnan(column.values)
+        if is_missing.any():
+            row = int(is_missing.argmax()) + 1
+            column = column._replace(missing=f"null in row {row} of {len(is_missing)}")
+        columns[name] = column
+    return replace(table, columns=columns)
+
+
 # Text
 
 
@@ -616,9 +642,10 @@ def _read_text(source: str, text: str) -> DataTable:
     plain = [line for line in head if not line.startswith(_COMMENT)]
     names = _names(source, plain or comments, len(columns), divider)
     named: dict[str, DataColumn] = {}
+    headers: dict[str, str] = {}  # of columns with a name that is there before
     left_out: dict[str, LeftOut] = dict(closing)
     repeats: dict[str, int] = {}
-    for (name, unit), values in zip(names, columns, strict=True):
+    for number, ((name, unit), values) in enumerate(zip(names, columns, strict=True)):
         is_empty = isinstance(values, np.ndarray) and bool(np.isnan(values).all())
         if not name and is_empty:
             continue  # a divider at the end of every line makes a column of nothing
@@ -629,12 +656,16 @@ def _read_text(source: str, text: str) -> DataTable:
             label = f"{'_' * count}{name}" if count < 10 else f"_{count}_{name}"
             count += 1
         repeats[name] = count
+        if label != name:
+            headers[label] = name
         if isinstance(values, LeftOut):
             left_out[label] = values
         else:
-            named[label] = DataColumn(values, unit)
+            missing = _missing_field(values, number, rows, divider)
+            named[label] = DataColumn(values, unit, missing=missing)
     is_openfast = any(map(_OPENFAST_HEAD.search, head))
-    return DataTable(source, named, left_out, "openfast" if is_openfast else "")
+    program = "openfast" if is_openfast else ""
+    return DataTable(source, named, left_out, program, headers)
 
 
 def _is_closing(line: str, divider: str | None, width: int) -> bool:
@@ -899,6 +930,26 @@ def _columns_of_rows(
         else:
             columns.append(_numbers_of_texts(column.to_numpy(object), rows, is_comma=is_comma))
     return columns
+
+
+def _missing_field(
+    values: NDArray[np.float64], number: int, rows: Lines, divider: str | None
+) -> str:
+    """Return what stands in place of the first missing number, see `DataColumn.missing`.
+
+    Parameters
+    ----------
+    values : (n,) numbers of a column, NaN where one is missing.
+    number : of the column, from 0.
+    rows, divider : see `_columns_of_rows`.
+    """
+    is_missing = np.isnan(values)
+    if not is_missing.any():
+        return ""
+    row = int(is_missing.argmax())
+    line, text = rows[row]
+    field = _fields(text, divider)[number]
+    return f"{'nan' if field else 'empty'} in row {row + 1} of {len(values)} (line {line})"
 
 
 def _refuse_ragged(source: str, rows: Lines, divider: str | None, width: int) -> None:

@@ -360,6 +360,16 @@ def _sources(
             if other.name == channel.name:
                 both = f"both {source.column!r} and {name!r} could be {channel.name}"
                 allowed = f"`{channel.key}` in a mapping file says which"
+                header = table.headers.get(name, name)
+                if header == table.headers.get(source.column, source.column):
+                    units = {table[column].unit for column in (source.column, name)}
+                    unit = units.pop() if len(units) == 1 else ""
+                    shown = f"{header} [{unit}]" if unit else header
+                    both = f"two columns {shown!r} could be {channel.name}"
+                    allowed = (
+                        f"other names, or `{channel.key} = {source.column!r}` (the first), "
+                        f"`{channel.key} = {name!r}` (the second) in a mapping file"
+                    )
                 raise InputError(f"{table.source}: {both}; allowed: {allowed}")
         sources[channel] = suggested
     return sources, reasons, tuple(loads_left_out)

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.errors import InputError
+from rotor_mbs.scenario.keys import counted
 from rotor_mbs.scenario.time_table import ALIGNMENT
 from rotor_mbs.solution.trajectory import Array
 
@@ -62,7 +63,7 @@ def ordered_rows(
     """
     notes = []
     if len(time) < _MIN_ROWS:
-        raise InputError(f"{source}: {len(time)} rows; allowed: {_MIN_ROWS} or more")
+        raise InputError(f"{source}: {counted(len(time), 'row')}; allowed: {_MIN_ROWS} or more")
     steps = np.abs(np.diff(time))
     usual = float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else 0.0
     time = np.where(np.abs(time) <= _NEAR_ZERO * usual, 0.0, time)
@@ -82,7 +83,8 @@ def ordered_rows(
         raise InputError(f"{source}: ends at t = {time.max():g} s; allowed: {allowed}")
     if early:
         places = places[time[places] >= 0.0]
-        notes.append(f"{early} rows before t = 0 are not compared")
+        verb = "is" if early == 1 else "are"
+        notes.append(f"{counted(early, 'row')} before t = 0 {verb} not compared")
     is_kept = np.ones(len(places), dtype=bool)
     twice = at_jumps = 0
     for row in np.flatnonzero(np.diff(time[places]) == 0.0):
@@ -103,14 +105,16 @@ def ordered_rows(
                 f"{source}: {problem} {first + 1} with other numbers; allowed: {allowed}"
             )
     if twice:
-        notes.append(f"{twice} rows are there twice: one of each is compared")
+        verb = "is" if twice == 1 else "are"
+        notes.append(f"{counted(twice, 'row')} {verb} there twice: one of each is compared")
     if at_jumps:
-        notes.append(
-            f"{at_jumps} rows before a jump of a load are not compared, those after it are"
-        )
+        text = "rows before a jump of a load are not compared, those after it are"
+        if at_jumps == 1:
+            text = "row before a jump of a load is not compared, the one after it is"
+        notes.append(f"{at_jumps} {text}")
     places = places[is_kept]
     if len(places) < _MIN_ROWS:
-        problem = f"{len(places)} rows at different times from t = 0 on"
+        problem = f"{counted(len(places), 'row')} at different times from t = 0 on"
         raise InputError(f"{source}: {problem}; allowed: {_MIN_ROWS} or more")
     return OrderedRows(places, time[places], tuple(notes))
 

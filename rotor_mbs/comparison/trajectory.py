@@ -43,6 +43,7 @@ from rotor_mbs.models.lagrange.defects import rates_of_change
 from rotor_mbs.models.lagrange.heyoka_adapter import is_available
 from rotor_mbs.models.lagrange.reference import TimedReference, reference_at
 from rotor_mbs.runs.read import Record
+from rotor_mbs.scenario.keys import counted
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.defects import FLOOR_SAFETY, Defects
 from rotor_mbs.solution.metrics import horizon, horizon_samples
@@ -568,7 +569,8 @@ def _missing_rows(
     last = min(scene.duration, float(rows.exact.trajectory.time[-1]))
     step = float(np.diff(time).max(initial=0.0))
     if count < _MIN_ROWS and len(data.time) > count:
-        inside = f"{count} of {len(data.time)} rows within the {scene.duration:g} s of {scene.name}"
+        of_all = f"{count} of {counted(len(data.time), 'row')}"
+        inside = f"{of_all} within the {scene.duration:g} s of {scene.name}"
         hint = "is the time in s? `unit` of the time in a mapping file says otherwise"
         yield "inaccurate", f"{inside}; {hint}"
     elif time[-1] < last - _MAX_GAP * step:
@@ -589,7 +591,7 @@ def _unchecked_parts(
     """
     defects, until = rows.defects, rows.until
     if until < _MIN_ROWS:
-        yield "unchecked", f"{until} rows up to the horizon: too few to be compared"
+        yield "unchecked", f"{counted(until, 'row')} up to the horizon: too few to be compared"
     if defects is None and rows.note and until < len(rows.places):
         after = f"after the horizon at {rows.horizon_s:.6g} s nothing is checked"
         yield "unchecked", f"{after}; {rows.note}"
@@ -628,7 +630,9 @@ def _notes_on_rows(
     notes = [rows.note] if rows.note else []
     later = len(data.time) - len(rows.data.time)
     if later:
-        notes.append(f"{later} rows after the scene's {scene.duration:g} s are not compared")
+        verb = "is" if later == 1 else "are"
+        after = f"after the scene's {scene.duration:g} s"
+        notes.append(f"{counted(later, 'row')} {after} {verb} not compared")
     notes += data.notes
     if data.precision:
         notes.append(f"numbers of {data.precision}")

@@ -410,7 +410,7 @@ NOT_NUMBERS: dict[str, tuple[str, Callable[[Path], Any], str]] = {
                 | {"pitch 3 rate": [None, *TIME[1:]]}
             )
         ),
-        "column 'pitch 3 rate' is nan in row 1 of 101",
+        "column 'pitch 3 rate' is null in row 1 of 101",
     ),
     "text in JSON": (
         "data.json",
@@ -458,7 +458,7 @@ def test_a_channel_without_numbers_ends_with_status_2(case: str, tmp_path: Path)
         (["0.1"] * 101, "row 1 has '0.1', no number"),
         (np.array(["a"] * 101), "row 1 has 'a', no number"),
         (TIME > 0.5, "true or false, no numbers"),
-        (TIME + 1j, "complex numbers, no numbers"),
+        (TIME + 1j, "complex numbers; allowed: real numbers"),
         (np.full(101, "2020-01-01", "datetime64[s]"), "dates, no numbers"),
     ],
 )

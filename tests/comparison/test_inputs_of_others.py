@@ -198,7 +198,7 @@ CASES = {
     "single precision, no rates": Case(
         "a.npz", lambda p, r: float32(p, r, "angles"), note="times of single precision"
     ),
-    "null": Case("a.json", null_rate, refusal="column 'pitch 3 rate' is nan in row 1 of 101"),
+    "null": Case("a.json", null_rate, refusal="column 'pitch 3 rate' is null in row 1 of 101"),
     "derivatives": Case(
         "a.csv", derivatives, "inaccurate", likely="pitch 3 rate: too large by a factor of 1.7"
     ),

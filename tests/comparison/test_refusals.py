@@ -10,7 +10,7 @@ import pytest
 from support.scenes import paper
 
 import rotor_mbs as rm
-from rotor_mbs.comparison.data import load_data
+from rotor_mbs.comparison.data import data_of_table, load_data
 from rotor_mbs.comparison.formats import read_in_worker
 from rotor_mbs.errors import InputError
 
@@ -112,3 +112,68 @@ def test_a_channel_that_only_leaves_out_is_told_from_a_missing_column() -> None:
     allowed = '"pitch_2" in `only`, or omit = ["pitch_2"], in a mapping file'
     assert comparison.message == f"pitch 2 is not in `only`; allowed: {allowed}"
     assert rm.compare(data, SCENE, columns={"only": only, "omit": ["pitch_2"]}).status == "ok"
+
+
+HEAD = b"time,rotor [rad],pitch 1\n"
+FILES = {
+    "two columns of one name": (
+        "a.csv",
+        b"time,rotor [rad],rotor [rad]\n0,1,1\n1,2,2\n2,3,3\n",
+        "two columns 'rotor [rad]' could be rotor; allowed: other names, or `rotor = 'rotor'` "
+        "(the first), `rotor = '_rotor'` (the second) in a mapping file",
+    ),
+    "an empty cell": (
+        "a.csv",
+        b"# written\n" + HEAD + b"0,1,1\n1,,2\n2,3,3\n",
+        "column 'rotor' is empty in row 2 of 3 (line 4); allowed: finite numbers",
+    ),
+    "nan": (
+        "a.csv",
+        HEAD + b"0,1,1\n1,2,2\n2,3,nan\n",
+        "column 'pitch 1' is nan in row 3 of 3 (line 4); allowed: finite numbers",
+    ),
+    "an empty cell beside Fortran's numbers": (
+        "a.csv",
+        HEAD + b"0,1.5D-3,1\n1,,2\n2,3.5D-3,3\n",
+        "column 'rotor' is empty in row 2 of 3 (line 3); allowed: finite numbers",
+    ),
+    "null in an array": (
+        "a.json",
+        b'{"time": [0, 1, 2], "rotor": [1, null, 3]}',
+        "column 'rotor' is null in row 2 of 3; allowed: finite numbers",
+    ),
+    "null in a record": (
+        "a.json",
+        b'[{"time": 0, "rotor": 1}, {"time": 1, "rotor": null}]',
+        "column 'rotor' is null in row 2 of 2; allowed: finite numbers",
+    ),
+    "one row": ("a.csv", HEAD + b"0,1,1\n", "1 row; allowed: 3 or more"),
+    "a damaged MAT file": (
+        "a.mat",
+        b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM" + bytes(range(1, 40)),
+        "not a MAT file that can be read; allowed: text with a header",
+    ),
+}
+
+
+def refusal_of(path: Path) -> str:
+    with pytest.raises(InputError) as caught:
+        data_of_table(read_in_worker((path, "", SCENE.name)), SCENE)
+    return str(caught.value)
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_what_a_file_lacks_is_told_in_its_own_words(name: str, tmp_path: Path) -> None:
+    file, content, message = FILES[name]
+    (tmp_path / file).write_bytes(content)
+    assert f"{file}: {message}" in refusal_of(tmp_path / file)
+
+
+def test_arrays_of_objects_and_of_complex_numbers_are_named(tmp_path: Path) -> None:
+    objects = np.array([None, 1.0], dtype=object)
+    np.savez(tmp_path / "a.npz", time=TIME, rotor=TIME, pitch_1=objects)
+    message = "column 'pitch_1': an array of Python objects; allowed: real numbers"
+    assert message in refusal_of(tmp_path / "a.npz")
+    np.savez(tmp_path / "b.npz", time=TIME, rotor=TIME + 1j, pitch_1=TIME)
+    message = "column 'rotor': complex numbers; allowed: real numbers, a row for every time"
+    assert message in refusal_of(tmp_path / "b.npz")
