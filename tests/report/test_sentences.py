@@ -270,6 +270,8 @@ def test_a_comparison_names_the_onset_of_a_fault_and_crosses_only_what_differs(
     rows = rows_of(section_of(text, "table"))
     assert rows["rotor"][1].startswith("✗")
     assert rows["pitch 1"][1].startswith("✓")
+    checked = [name for name, cells in rows.items() if cells[1].startswith("✓")]
+    assert f"within the tolerance: {', '.join(checked)}." in answer_of(text)
 
 
 def test_what_stays_at_the_reference_is_not_crossed(tmp_path: Path) -> None:
@@ -285,8 +287,11 @@ def test_what_stays_at_the_reference_is_not_crossed(tmp_path: Path) -> None:
     assert all(
         channel.defect > compared.verdict.tolerance for channel in compared.verdict.channels[1:4]
     )
-    rows = rows_of(section_of(text_of(compared.to_html(tmp_path / "out").parent), "table"))
+    text = text_of(compared.to_html(tmp_path / "out").parent)
+    rows = rows_of(section_of(text, "table"))
     assert [name for name, cells in rows.items() if cells[1].startswith("✗")] == ["pitch 1"]
+    # A defect that follows from another channel's error is not within the tolerance, either.
+    assert "within the tolerance" not in answer_of(text)
 
 
 def test_data_that_agree_are_said_to(tmp_path: Path) -> None:

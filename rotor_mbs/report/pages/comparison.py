@@ -130,7 +130,7 @@ def comparison_answer(verdict: DataVerdict, onset: tuple[float, str] | None) -> 
         sentences = [text.format(verdict.scene, _place(onset[0], verdict), onset[1])]
     else:
         sentences = [Markup('<span class="bad">The data are {}</span>.').format(verdict.status)]
-    good = [channel.name for channel in verdict.channels if not _is_outside(channel, verdict)]
+    good = [channel.name for channel in verdict.channels if _tone(channel, verdict) == "good"]
     if not verdict.agrees and good and len(good) < len(verdict.channels):
         sentences.append(
             Markup("{} within the tolerance: {}.").format(
@@ -164,6 +164,21 @@ def _is_outside(channel: ChannelErrors, verdict: DataVerdict) -> bool:
         is_beyond(other.defect) and is_beyond(other.error_whole) for other in verdict.channels
     )
     return is_beyond(channel.defect) and (is_beyond(channel.error_whole) or not is_explained)
+
+
+def _tone(channel: ChannelErrors, verdict: DataVerdict) -> str:
+    """Return "good" for a channel within the tolerance, "bad" for one that is what is wrong.
+
+    It is "" for a defect that follows from another channel's error, and where none is known.
+
+    Parameters
+    ----------
+    channel, verdict : see `_is_outside`.
+    """
+    if _is_outside(channel, verdict):
+        return "bad"
+    is_within = channel.defect is not None and channel.defect <= verdict.tolerance
+    return "good" if is_within else ""
 
 
 def onset_of(record: Record, verdict: DataVerdict) -> tuple[float, str] | None:
@@ -341,11 +356,7 @@ def _table_section(verdict: DataVerdict) -> Section:
     table = channel_table(verdict)
     rows: list[Row] = []
     for channel, (name, error, defect, *others) in zip(verdict.channels, table.rows, strict=True):
-        tone = ""  # also of a defect that follows from another channel's error
-        if _is_outside(channel, verdict):
-            tone = "bad"
-        elif channel.defect is not None and channel.defect <= verdict.tolerance:
-            tone = "good"
+        tone = _tone(channel, verdict)
         sign = {"good": "✓ ", "bad": "✗ "}.get(tone, "")
         rows.append([name, error, TableCell(f"{sign}{typeset(defect)}", tone), *others])
     heading = "Channels up to the horizon" if verdict.axis == "time" else "Channels"
