@@ -78,6 +78,11 @@ def neville(previous: Sequence[Array], values: Array) -> list[Array]:
 # an even number of steps is it the same in all columns.
 
 
+# Without loads accelerations and multipliers are carried over this many parts, over which their
+# errors grow little, and replaced where they are off by more than this share.
+_PARTS_CARRIED, _LARGEST_CARRIED = 10, 0.01
+
+
 class _Kept(NamedTuple):
     """Hold the state at the end of a part of an interval, under the loads of that interval."""
 
@@ -118,6 +123,7 @@ class ExtrapolatedSolver:
         # With dampers or loads over time the work depends on the path: it is extrapolated with the
         # state.
         self._integrates_work = scene.work_needs_path
+        self._gives_loads = scene.wants("loads")
         parts = chain.parts(scene, self._loads)
         sensors = [part.name for part in parts if part.kind == "sensor"]
         self._of_rates = [name for name in sensors if name.endswith(("rotation", "spin"))]
@@ -228,8 +234,10 @@ class ExtrapolatedSolver:
                 state, gained = row[-1], 0.0
                 if self._integrates_work:
                     state, gained = state[:-1], float(state[-1])
-                work = self.kept[-1].work + gained
-                self._keep(end, interval, self._consistent(state), self.system.turns(), work)
+                state, turns = self._consistent(state), self.system.turns()
+                if self._gives_loads or len(self.kept) % _PARTS_CARRIED == 0:
+                    state = self._renewed(start, end, state, turns)
+                self._keep(end, interval, state, turns, self.kept[-1].work + gained)
                 return ""
         return (
             f"near t = {start:.6g} s the error of an interval of {end - start:.3g} s remains above "
@@ -294,6 +302,35 @@ class ExtrapolatedSolver:
             insignificant = sizes[:, :, columns] < _INSIGNIFICANT * largest[:, None, None]
             kinds[:, :, columns][insignificant] = 0.0
         return values
+
+    def _renewed(self, start: float, end: float, values: Array, turns: Array) -> Array:
+        """Return a state with accelerations and multipliers that follow from its rates.
+
+        With constraints at velocity level nothing holds the accelerations along the constraints,
+        nor the multipliers: their errors are carried from part to part and grow, with dampers
+        tenfold in a few turns. The loads have these errors; the motion feels them when they are
+        much larger than the accelerations.
+
+        Parameters
+        ----------
+        start, end : s, of a part.
+        values, turns : the extrapolated state at its end, as of `System.values`, `System.turns`.
+
+        Returns
+        -------
+        ndarray
+            Without loads the state as it was, where its accelerations are nearly right.
+        """
+        self.system.start_from(values, turns)
+        renewed, _ = self.system.initial_values(end)
+        if self._gives_loads:
+            return renewed
+        accelerations = self._rotations[2]
+        error = np.abs(renewed[accelerations] - values[accelerations]).max()
+        # Near rest the accelerations themselves are rounding errors.
+        rounding = _ROUNDING / (end - start) ** 2
+        allowed = max(_LARGEST_CARRIED * np.abs(renewed[accelerations]).max(), rounding)
+        return values if error <= allowed else renewed
 
     def _keep(
         self, time: float, interval: Interval, values: Array, turns: Array, work: float
