@@ -254,9 +254,7 @@ def _checks_of_energies(run: RunSamples, bounds: Bounds) -> Iterator[Check]:
             if name == "work" and not is_built_in(run.method):
                 # Work that is integrated with the motion is no function of the state alone: it is
                 # only as accurate as the balance of energy.
-                check = replace(
-                    check, bound=max(check.bound, bounds.of("energy", run.method).value)
-                )
+                check = replace(check, bound=max(check.bound, energy_allowed(run, bounds)))
             yield check
 
 
@@ -276,9 +274,15 @@ def _checks_of_motion(run: RunSamples, bounds: Bounds) -> Iterator[Check]:
         fault = (
             f"energy drift {metrics['energy_drift_max']:.1e} of the energy scale, allowed {{bound}}"
         )
-        yield _with_fault(
-            bounded(bounds, "energy", run.where("balance"), drift, "of scale", hint), fault
+        balance = Check(
+            "energy",
+            run.where("balance"),
+            drift,
+            energy_allowed(run, bounds),
+            hint,
+            "of scale",
         )
+        yield _with_fault(balance, fault)
     yield from _checks_of_quantities(run, bounds)
     if "defect_max" in metrics:
         yield from _checks_of_defects(run, bounds)
@@ -411,6 +415,24 @@ def defect_allowed(metrics: Metrics, bound: float) -> float:
     """
     judged, excess = metrics.get("defect_judged", 0.0), metrics.get("defect_excess", 0.0)
     return bound * (excess / judged) if 0.0 < judged < math.inf else bound
+
+
+def energy_allowed(run: RunSamples, bounds: Bounds) -> float:
+    """Return the error of the energy balance that is allowed, a share of the energy scale.
+
+    What a method may do to the energy in 0.01 s adds up over the run, as defects do, and more of
+    it is allowed in an interval that is longer or in which errors grow: the bound is multiplied by
+    the mean of the intervals' factors for defects, but is at most 0.01.
+
+    Parameters
+    ----------
+    run, bounds : see `run_checks`.
+    """
+    bound = bounds.of("energy", run.method).value
+    if run.defects is None:
+        return bound
+    factor = float(run.defects.bound_factors.mean())
+    return max(bound, min(bound * factor, OK_ERROR)) if math.isfinite(factor) else bound
 
 
 def quantity_bound(rule: QuantityMetric, bounds: Bounds, method: str) -> float | None:

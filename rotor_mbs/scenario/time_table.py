@@ -37,6 +37,8 @@ MAX_ROWS = 100
 # damped pitch: one in so many seconds, up to this number, which bounds the memory.
 _ROW_STEP = 5e-4
 _MOST_ROWS = 1000
+# Rows of a segment, at least, where they are integrated by polynomials through so many.
+POLYNOMIAL_ROWS = 8
 
 # Place of the rotor's torque in `Scene.load_tables`, and in the segments that are cut from it.
 ROTOR_TORQUE = 0
@@ -255,6 +257,20 @@ def intervals(parts: Sequence[Segment], samples: int, *, every_sample: bool) -> 
         segment = parts[bisect_right(segment_starts, 0.5 * (t0 + t1)) - 1]
         stops.append(Interval(t0, t1, max(1, round(end - start)), end not in between, segment))
     return stops
+
+
+def step_within(segment: Segment, step: float) -> float:
+    """Return the largest step (s) with which a segment has a row for each point of a polynomial.
+
+    Work is integrated through these rows; between two kinks of the loads that are a step or two
+    apart it would else be of second order.
+
+    Parameters
+    ----------
+    segment : the loads.
+    step : s, the largest step allowed elsewhere.
+    """
+    return min(step, (segment.end - segment.start) / (POLYNOMIAL_ROWS - 1))
 
 
 def steps_and_rows(span: float, step: float, rows_between: bool) -> tuple[int, int]:

@@ -148,6 +148,24 @@ def test_energy_angles_and_gap_have_a_bound_each(method: str) -> None:
         assert status(with_gap(exact, 1e-16), method=method)[0] == "inaccurate"
 
 
+def test_the_bound_of_the_energy_grows_with_the_rows_as_that_of_defects(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """An interval of 0.04 s may change the energy as much as four of 0.01 s do; at most by 0.01."""
+    method = "exudyn_tree/rk67"
+    bound = BOUNDS.of("energy", method).value
+    for factor, share in ((1.0, 1.0), (4.0, 4.0), (1e300, OK_ERROR / bound)):
+        defects = made_defects((0.0, 0.0))
+        # A cached property is what its instance's dictionary says.
+        defects.__dict__["bound_factors"] = np.full(2, factor)
+        monkeypatch.setattr(
+            judgement_module, "defects_of", lambda *_, defects=defects, **__: defects
+        )
+        for side, expected in SIDES:
+            drifting = with_drift(moving(), side * share * bound)
+            assert status(drifting, method=method)[0] == expected
+
+
 @pytest.mark.parametrize("method", method_names(is_corrected=True))
 def test_the_largest_defect_has_a_bound(method: str, monkeypatch: pytest.MonkeyPatch) -> None:
     bound = min(BOUNDS.of("defect", method).value, OK_ERROR)

@@ -24,7 +24,7 @@ from rotor_mbs.methods.time_limit import (
 )
 from rotor_mbs.models.exudyn.geometry import LISTS, Part, Ref
 from rotor_mbs.models.exudyn.schemes import Scheme
-from rotor_mbs.scenario.time_table import Interval, Segment, steps_and_rows
+from rotor_mbs.scenario.time_table import Interval, Segment, step_within, steps_and_rows
 from rotor_mbs.solution.trajectory import Array, Integration, limit_at_zero
 
 os.environ.setdefault("EXUDYN_MODULE", "fast")
@@ -214,9 +214,12 @@ class System:
             trials.clear()
             settings.solution.sensors.append = interval is not intervals[0]
             span = (interval.end - interval.start) / interval.sample_intervals
-            steps, rows = (
-                (1, 1) if scheme.step is None else steps_and_rows(span, scheme.step, rows_between)
-            )
+            steps, rows = 1, 1
+            if scheme.step is not None:
+                step = scheme.step
+                if rows_between:
+                    step = step_within(interval.segment, step)
+                steps, rows = steps_and_rows(span, step, rows_between)
             integration.startTime, integration.endTime = interval.start, interval.end
             integration.numberOfSteps = steps * interval.sample_intervals
             every_step = scheme.step is None and rows_between

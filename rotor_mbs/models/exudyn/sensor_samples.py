@@ -14,7 +14,13 @@ from rotor_mbs.models.exudyn import chain, tree
 from rotor_mbs.models.exudyn.geometry import Body, mounting, movable_blades, rotation_x
 from rotor_mbs.models.exudyn.loads import chain_loads, matrices, prescribed_moments, tree_loads
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.scenario.time_table import ROTOR_TORQUE, Segment, is_constant, values_at
+from rotor_mbs.scenario.time_table import (
+    POLYNOMIAL_ROWS,
+    ROTOR_TORQUE,
+    Segment,
+    is_constant,
+    values_at,
+)
 from rotor_mbs.solution.trajectory import (
     Array,
     Trajectory,
@@ -23,9 +29,6 @@ from rotor_mbs.solution.trajectory import (
     finite_samples,
     sample_times,
 )
-
-# Points of the local polynomial that approximates the power between rows.
-_POINTS = 8
 
 
 class _Reader:
@@ -340,7 +343,7 @@ def cumulative_integral(time: Array, values: Array) -> Array:
     time : (n,) s, increasing.
     values : (n,) integrand.
     """
-    points = min(_POINTS, len(time))
+    points = min(POLYNOMIAL_ROWS, len(time))
     # The rows that the polynomial of each interval goes through: equally many on both sides, but
     # near the ends.
     first = np.clip(np.arange(len(time) - 1) - (points // 2 - 1), 0, len(time) - points)

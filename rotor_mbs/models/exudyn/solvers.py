@@ -78,8 +78,8 @@ def neville(previous: Sequence[Array], values: Array) -> list[Array]:
 # an even number of steps is it the same in all columns.
 
 
-# Without loads accelerations and multipliers are carried over this many parts, over which their
-# errors grow little, and replaced where they are off by more than this share.
+# Accelerations and multipliers are carried over this many parts, over which their errors grow
+# little, and replaced where the accelerations are off by more than this share.
 _PARTS_CARRIED, _LARGEST_CARRIED = 10, 0.01
 
 
@@ -234,10 +234,7 @@ class ExtrapolatedSolver:
                 state, gained = row[-1], 0.0
                 if self._integrates_work:
                     state, gained = state[:-1], float(state[-1])
-                state, turns = self._consistent(state), self.system.turns()
-                if self._gives_loads or len(self.kept) % _PARTS_CARRIED == 0:
-                    state = self._renewed(start, end, state, turns)
-                self._keep(end, interval, state, turns, self.kept[-1].work + gained)
+                self._end_part(end, interval, self._consistent(state), gained)
                 return ""
         return (
             f"near t = {start:.6g} s the error of an interval of {end - start:.3g} s remains above "
@@ -303,8 +300,8 @@ class ExtrapolatedSolver:
             kinds[:, :, columns][insignificant] = 0.0
         return values
 
-    def _renewed(self, start: float, end: float, values: Array, turns: Array) -> Array:
-        """Return a state with accelerations and multipliers that follow from its rates.
+    def _end_part(self, end: float, interval: Interval, values: Array, gained: float) -> None:
+        """Keep the state at the end of a part, with the accelerations and multipliers it implies.
 
         With constraints at velocity level nothing holds the accelerations along the constraints,
         nor the multipliers: their errors are carried from part to part and grow, with dampers
@@ -313,24 +310,37 @@ class ExtrapolatedSolver:
 
         Parameters
         ----------
-        start, end : s, of a part.
-        values, turns : the extrapolated state at its end, as of `System.values`, `System.turns`.
-
-        Returns
-        -------
-        ndarray
-            Without loads the state as it was, where its accelerations are nearly right.
+        end : s, of the part.
+        interval : whose loads act.
+        values : the extrapolated state, as of `System.values`.
+        gained : J, work of loads and dampers in the part.
         """
-        self.system.start_from(values, turns)
-        renewed, _ = self.system.initial_values(end)
+        turns, work = self.system.turns(), self.kept[-1].work + gained
+        is_due = len(self.kept) % _PARTS_CARRIED == 0
+        renewed = values
+        if is_due or self._gives_loads:
+            self.system.start_from(values, turns)
+            renewed, _ = self.system.initial_values(end)
+        if is_due and self._is_off(values, renewed, end - self.kept[-1].time):
+            values = renewed
+        # The motion is the same, whether loads are requested or not: only readings differ.
+        self._keep(end, interval, values, turns, work)
         if self._gives_loads:
-            return renewed
+            self.kept[-1] = self.kept[-1]._replace(values=renewed)
+
+    def _is_off(self, values: Array, renewed: Array, span: float) -> bool:
+        """Return whether carried accelerations are too far from those that the state implies.
+
+        Parameters
+        ----------
+        values, renewed : as of `System.values`, carried and implied.
+        span : s, of the part.
+        """
         accelerations = self._rotations[2]
         error = np.abs(renewed[accelerations] - values[accelerations]).max()
         # Near rest the accelerations themselves are rounding errors.
-        rounding = _ROUNDING / (end - start) ** 2
-        allowed = max(_LARGEST_CARRIED * np.abs(renewed[accelerations]).max(), rounding)
-        return values if error <= allowed else renewed
+        rounding = _ROUNDING / span**2
+        return bool(error > max(_LARGEST_CARRIED * np.abs(renewed[accelerations]).max(), rounding))
 
     def _keep(
         self, time: float, interval: Interval, values: Array, turns: Array, work: float
