@@ -20,7 +20,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
-from rotor_mbs.errors import InputError, RotorError, one_line
+from rotor_mbs.errors import InputError, RotorError, one_line, shown_value
 from rotor_mbs.methods.base import BuiltItem, Method, no_items, step_ladder, tolerance_ladder
 from rotor_mbs.processes.worker import TaskLostError, Worker, memory_limit_text
 
@@ -75,7 +75,8 @@ class MethodFile:
         if taken is not None:
             raise InputError(f"{self.path}: {taken.name} has this name; allowed: another file name")
         methods: dict[str, Method] = {}
-        for method in self.defined(self.execute()):
+        module = self.execute()
+        for method in self.defined(module):
             if any(method is known for known in built_in):  # imported
                 continue
             own = self._named(method)
@@ -86,9 +87,10 @@ class MethodFile:
                 )
             methods[own.name] = own
         if not methods:
-            raise InputError(
-                f"{self.path}: defines no Method; allowed: at least one (docs/your-engine.md)"
-            )
+            problem = "defines no Method; allowed: at least one"
+            if "METHOD" in vars(module):
+                problem = f"METHOD is {shown_value(module.METHOD)}; allowed: a Method"
+            raise InputError(f"{self.path}: {problem} (docs/your-engine.md)")
         return methods
 
     def execute(self) -> ModuleType:

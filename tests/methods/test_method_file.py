@@ -137,8 +137,13 @@ def test_a_run_is_keyed_by_the_code_of_its_file() -> None:
         ("mine.py", "while True: pass\n", "mine.py: not loaded within 0.5 s"),
         (
             "mine.py",
-            "METHOD = 1\n",
+            "a = 1\n",
             "mine.py: defines no Method; allowed: at least one (docs/your-engine.md)",
+        ),
+        (
+            "mine.py",
+            "METHOD = 1\n",
+            "mine.py: METHOD is 1; allowed: a Method (docs/your-engine.md)",
         ),
         (
             "lagrange.py",
@@ -151,7 +156,7 @@ def test_a_run_is_keyed_by_the_code_of_its_file() -> None:
             "other/mine.py: methods mine/... are those of mine.py; allowed: another file name",
         ),
     ],
-    ids=["syntax", "ends", "hangs", "no method", "a shipped name", "a name twice"],
+    ids=["syntax", "ends", "hangs", "no method", "a number", "a shipped name", "a name twice"],
 )
 def test_a_file_that_cannot_be_used_is_one_line(
     name: str, text: str, line: str, monkeypatch: pytest.MonkeyPatch
