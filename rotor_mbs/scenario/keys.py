@@ -162,7 +162,11 @@ def read_number(value: object) -> float:
             result = expressions.evaluate(value)
         except ValueError as error:
             allowed = f"in quotes {expressions.ALLOWED}"
-            raise invalid(f"{as_text(value)}: {error}", allowed) from error
+            shown = as_text(value)
+            reason = str(error)
+            # The reason may begin with the whole text, or a part of it.
+            what = reason if reason.startswith(f"{shown} ") else f"{shown}: {reason}"
+            raise invalid(what, allowed) from error
     if isinstance(result, bool) or not isinstance(result, Real):
         raise invalid(f"{as_text(value)} is not a number")
     number = as_float(result)

@@ -29,6 +29,21 @@ def test_value(text: str, value: float) -> None:
 
 
 @pytest.mark.parametrize(
+    ("text", "problem"),
+    [
+        ("1 2", '"1 2" is not a complete expression'),
+        ("abc", '"abc" is not a number or an operation on numbers'),
+        ("1 + abc", '"1 + abc": "abc" is not a number or an operation on numbers'),
+    ],
+)
+def test_a_message_has_the_value_once(text: str, problem: str) -> None:
+    with pytest.raises(InputError) as raised:
+        read_number(text)
+    assert problem in str(raised.value)
+    assert str(raised.value).count(text) == 1
+
+
+@pytest.mark.parametrize(
     "text",
     [
         "", "   ", "1e400", "9**9**9**9", "1/0", "(-8)**(1/3)", "sqrt(-1)", "nan", "-inf", "Pi", "٣", "²", "1_000",
