@@ -148,6 +148,12 @@ class Axis:
             what = f"has {' and '.join(given)}" if given else "has no values"
             raise invalid(what, f"exactly one of {', '.join(VARIED)}")
 
+    def place_of(self, value: float) -> KeyPath:
+        """Return where in its table a value stands: the entry of a list, else where it is from."""
+        if self.values is not None:
+            return ("values", self.values.index(value))
+        return (next(name for name in VARIED if getattr(self, name) is not None),)
+
     @property
     def is_drawn(self) -> bool:
         """Return whether its values are random, or those of a Sobol sequence."""
@@ -618,15 +624,23 @@ def _sweep(
     sweep = Sweep(design, base, file, path)
     # A problem of many rows is reported once; a dict keeps the order.
     faults: dict[KeyProblem, None] = {}
+    found: set[KeyProblem] = set()  # in scenes with one axis alone
     for i, variants, row in _rows_to_check(sweep):
         try:
             variants.scene(row)
         except TableError as error:
             pairs = zip(variants.keys, row, strict=True)
             values = ", ".join(f"{key} = {value:g}" for key, value in pairs)
+            is_alone = len(row) == 1
             for fault in error.faults:
+                # What one axis alone does is no fault of another that varies beside it.
+                if not is_alone and fault in found:
+                    continue
+                found.add(fault)
+                axis, value = design.axes[i], row[0 if is_alone else i]
+                place = ("key",) if fault.is_of_key else axis.place_of(value)
                 what = fault.message if fault.is_of_key else f"{values}: {fault.message}"
-                faults.setdefault(KeyProblem(("axis", i, "key"), what))
+                faults.setdefault(KeyProblem(("axis", i, *place), what))
             if len(faults) >= _MAX_ROW_ERRORS:
                 break
     with file.with_line_numbers():

@@ -180,8 +180,25 @@ _BAD = {
     ),
     "a value out of range": (
         '[[axis]]\nkey = "blade.mass"\nlinear = {start = 9, end = -9, count = 5}',
+        5,
+        r"axis\[0\]\.linear: .*above 0",
+    ),
+    "a value out of range in a list": (
+        '[[axis]]\nkey = "blade.mass"\nvalues = [\n  9,\n  -9,\n]',
+        7,
+        r"axis\[0\]\.values\[1\]: .*above 0",
+    ),
+    "an unknown key beside a centre of mass, which is right": (
+        '[[axis]]\nkey = "initial.angels[1]"\nvalues = [1, 2]\n'
+        '[[axis]]\nkey = "blade.centre_of_mass[2]"\nvalues = [10, 11]',
         4,
-        "above 0",
+        r"^[^\n]*axis\[0\]\.key: initial\.angels: unknown key[^\n]*$",
+    ),
+    "a value out of range beside a centre of mass, which is right": (
+        '[[axis]]\nkey = "gravity"\nvalues = [1, -2]\n'
+        '[[axis]]\nkey = "blade.centre_of_mass[2]"\nvalues = [10, 11]',
+        5,
+        r"^[^\n]*axis\[0\]\.values\[1\]: gravity = -2: [^\n]*$",
     ),
     "unequal lists zipped": (
         (
