@@ -77,9 +77,10 @@ def check(arguments: argparse.Namespace) -> int:
             verdicts = study.check_default_set(bounds, arguments.jobs, progress, arguments.method)
     scenes = study.scenes_checked(arguments.file)
     if verdicts and earlier is not None:
-        verdicts += study.regressions(verdicts, earlier)
         before = study.scenes_checked(arguments.against)
-        verdicts += study.changed_scenes(scenes, before, are_allowed=arguments.allow_changed)
+        changes = study.changed_scenes(scenes, before, are_allowed=arguments.allow_changed)
+        changed = {change.where.scene for change in changes if change.value}
+        verdicts += [*study.regressions(verdicts, earlier, changed), *changes]
         if arguments.file is not None and is_sweep(arguments.file):
             verdicts.append(study.runs_gone(arguments.file, arguments.against))
 

@@ -6,7 +6,7 @@ import itertools
 import math
 import tempfile
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
@@ -265,7 +265,9 @@ def changed_scenes(
         if len(changes) > _SHOWN_CHANGES:
             told.append(f"{len(changes) - _SHOWN_CHANGES} more")
         count = float(len(changes))
-        hint = f"{name}: {', '.join(told)}" if told else "as in the earlier file"
+        hint = "as in the earlier file"
+        if told:
+            hint = f"{name}: {', '.join(told)}; margins of another scene are not compared"
         checks.append(
             Check(
                 CHANGED,
@@ -291,7 +293,9 @@ def judged_runs(checks: Iterable[Check]) -> Counter[str]:
     )
 
 
-def regressions(new: Sequence[Check], old: Sequence[Check]) -> list[Check]:
+def regressions(
+    new: Sequence[Check], old: Sequence[Check], changed: Collection[str] = ()
+) -> list[Check]:
     """Return a check for each earlier one: by what factor its margin has shrunk.
 
     A factor above ten fails. There is also a check for each run that is missing now. The value is
@@ -301,11 +305,15 @@ def regressions(new: Sequence[Check], old: Sequence[Check]) -> list[Check]:
     Parameters
     ----------
     new, old : checks of this file and of the earlier one.
+    changed : names of scenes that differ: an error of one scene says nothing of that of another,
+        so only the presence of their runs is checked.
     """
     present = {(check.name, check.where): check for check in new}
     runs = {check.where[:2] for check in new}
     gone = {check.where[:2]: check for check in old if check.where[:2] not in runs}
-    kept = [check for check in old if check.where[:2] in runs]
+    kept = [
+        check for check in old if check.where[:2] in runs and check.where.scene not in changed
+    ]
     lost = [
         replace(check, name="run", where=check.where._replace(channel="all"))
         for check in gone.values()

@@ -31,6 +31,7 @@ from support.stored import Made, change_row, damage, drop, rotor, store
 from support.sweeps import THREE_RUNS, made_sweep
 
 import rotor_mbs as rm
+from rotor_mbs.analysis.checks import Check, Where
 from rotor_mbs.cli import verdicts as formats
 from rotor_mbs.methods.catalogue import REFERENCE, method_names
 from rotor_mbs.methods.solve import solve
@@ -39,6 +40,7 @@ from rotor_mbs.runs.rows import Rows
 from rotor_mbs.scenario.accuracy_bounds import Bound, shipped_bounds
 from rotor_mbs.scenario.catalogue import REFERENCES
 from rotor_mbs.solution.metrics import horizon_samples, running_growth
+from rotor_mbs.studies.check import regressions
 from rotor_mbs.studies.stored_references import frozen_solution
 
 ROOT = Path(__file__).parents[2]
@@ -265,12 +267,25 @@ def test_a_scene_that_changed_since_the_earlier_file_fails_unless_it_may(tmp_pat
     assert start in lines
     line = named(lines_of(new, "--against", old, status=1), f"FAIL scene: {scene.name} *")
     angle = str(scene.initial_angles[1]).removesuffix(".0")
-    change = f"; {scene.name}: blade.mass 15015 -> 15016, initial.angles[1] {angle} -> 0.25"
+    change = (
+        f"; {scene.name}: blade.mass 15015 -> 15016, initial.angles[1] {angle} -> 0.25; margins of "
+        "another scene are not compared"
+    )
     assert line.endswith(change)
-    allowed = lines_of(new, "--against", old, "--allow-changed", status=0)
+    allowed = lines_of(new, "--against", old, "--allow-changed", "-v", status=0)
     assert named(allowed, "pass scene").endswith(change)
+    assert not any(line.startswith("pass against") for line in allowed)
     assert not any("scene:" in line for line in lines_of(new, "--against", new, status=0))
     assert rotor_mbs("check", new, "--allow-changed").status == 2
+
+
+def test_of_a_changed_scene_only_missing_runs_are_regressions() -> None:
+    before = [Check("defect", Where("one", METHOD, name), 1e-9, 1.0, "", "rad") for name in "ab"]
+    now = [replace(check, value=0.5) for check in before]
+    assert len(regressions(now, before)) == 2
+    assert not regressions(now, before, {"one"})
+    (lost,) = regressions([], before, {"one"})
+    assert (lost.passed, lost.where.channel) == (False, "run: all")
 
 
 def test_a_sweep_of_a_changed_scene_fails_against_an_earlier_one(tmp_path: Path) -> None:
@@ -282,7 +297,7 @@ def test_a_sweep_of_a_changed_scene_fails_against_an_earlier_one(tmp_path: Path)
         rm.sweep(base, {"gravity": [9.7, 9.8]}, methods=[METHOD], output=path)
         files.append(path)
     line = named(lines_of(files[1], "--against", files[0], status=1), "FAIL scene")
-    assert line.endswith("; paper/fig11: blade.mass 15000 -> 15010")
+    assert "; paper/fig11: blade.mass 15000 -> 15010; margins" in line
 
 
 def test_a_reference_that_is_altered_or_not_there_fails(copy: Path) -> None:
