@@ -138,6 +138,7 @@ def read_mapping(
             raise InputError(f"columns: {problem}" for problem in error.problems) from error
     else:
         file, source = read_toml(Path(columns)), str(columns)
+        file.refuse_other_kind("a mapping of columns")
         with file.with_line_numbers():
             values = keys.read_keys(declared, file.tables)
     group = values.pop("group")

@@ -102,6 +102,7 @@ def read_bounds(path: Path) -> tuple[Bound, ...]:
     Raises InputError with every error of the file.
     """
     file = read_toml(path)
+    file.refuse_other_kind("a file of bounds")
     with file.with_line_numbers():
         entries: tuple[Bound, ...] = keys.read_keys(_FILE, file.tables)["bound"]
     return entries

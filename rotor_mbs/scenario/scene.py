@@ -1206,9 +1206,7 @@ def load_scene(
     path = Path(path)
     name = path.stem if name is None else name
     file = read_toml(path)
-    if "axis" in file.tables and "scene" in file.tables:
-        allowed = f"a scene, or: rotor-mbs sweep {file.source}"
-        raise InputError(f"{file.source}: is a sweep; allowed: {allowed}")
+    file.refuse_other_kind("a scene")
     with file.with_line_numbers():
         scene = scene_from_tables(file.tables, name, file.text, check)
     if "/" not in scene.name:

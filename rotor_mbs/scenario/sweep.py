@@ -552,12 +552,10 @@ def load_sweep(path: Path, check: ValuesCheck | None = None) -> Sweep:
         if shipped.is_file():
             path = shipped
     if not path.exists() and str(path) in dict(list_scenes()):
-        allowed = f"a sweep of scenes (rotor-mbs list), or: rotor-mbs run {path}"
+        allowed = f"a sweep (rotor-mbs list), or: rotor-mbs run {path}"
         raise InputError(f"{path}: is a scene; allowed: {allowed}")
     file = read_toml(path)
-    if "initial" in file.tables and "blade" in file.tables:
-        allowed = f"a sweep of scenes, or: rotor-mbs run {file.source}"
-        raise InputError(f"{file.source}: is a scene; allowed: {allowed}")
+    file.refuse_other_kind("a sweep")
     return _sweep(path, file, check)
 
 

@@ -46,6 +46,17 @@ _TOKEN = re.compile(
 )
 
 
+# Kinds of files: what each is called, and the command that takes it.
+_COMMANDS = {
+    "a scene": "rotor-mbs run {}",
+    "a sweep": "rotor-mbs sweep {}",
+    "a mapping of columns": "rotor-mbs compare DATA --scene SCENE --columns {}",
+    "a file of bounds": "rotor-mbs check FILE --bounds {}",
+}
+# Keys of which a mapping has one, unless it has tables with a column only.
+_MAPPING_KEYS = frozenset(("time", "speed", "omit", "only", "program", "openfast", "group"))
+
+
 class KeyProblem(NamedTuple):
     """What is wrong with a key or its value.
 
@@ -103,6 +114,36 @@ class TomlFile:
     source: str
     text: str
     tables: dict[str, Any]
+
+    @property
+    def kind(self) -> str:
+        """Return which kind of file its keys show it to be, as in messages; "" where none."""
+        keys = self.tables.keys()
+        if {"axis", "scene"} <= keys:
+            return "a sweep"
+        if {"blade", "initial"} <= keys:
+            return "a scene"
+        if "bound" in keys:
+            return "a file of bounds"
+        has_column = any(
+            isinstance(value, dict) and "column" in value for value in self.tables.values()
+        )
+        is_other = bool(keys & {"title", "blade", "blades", "axis", "scene"})
+        if not is_other and (has_column or keys & _MAPPING_KEYS):
+            return "a mapping of columns"
+        return ""
+
+    def refuse_other_kind(self, wanted: str) -> None:
+        """Raise InputError, in one line, if the file is certainly of another kind.
+
+        Parameters
+        ----------
+        wanted : the kind of file that is read.
+        """
+        kind = self.kind
+        if kind and kind != wanted:
+            command = _COMMANDS[kind].format(self.source)
+            raise InputError(f"{self.source}: is {kind}; allowed: {wanted}, or: {command}")
 
     @contextmanager
     def with_line_numbers(self, *path: str) -> Iterator[None]:

@@ -75,6 +75,15 @@ def test_the_message_has_the_reason(name: str) -> None:
     assert str(caught.value) == message
 
 
+def test_a_file_of_another_kind_is_no_mapping(tmp_path: Path) -> None:
+    path = tmp_path / "scene.toml"
+    path.write_text(SCENE.text, encoding="utf-8")
+    with pytest.raises(InputError) as caught:
+        rm.compare({"time": TIME, **ANGLES}, SCENE, columns=path)
+    command = f"a mapping of columns, or: rotor-mbs run {path}"
+    assert list(caught.value.problems) == [f"{path}: is a scene; allowed: {command}"]
+
+
 def test_an_array_of_another_length_beside_angles_is_unused_with_the_reason() -> None:
     data = load_data({"time": TIME, **ANGLES, "rates": np.ones((11, 2))}, SCENE)
     assert data.unused["rates[0]"] == "`rates` has 2 columns, the scene has 4 coordinates"

@@ -275,6 +275,13 @@ NO_NAMES = ("", "../paper/fig05", "/paper/fig05", "paper/fig05\n", "paper/\0")
         ("circle.toml", "circle.toml: cannot be re"),
         ("pipe.toml", "is not a regular file"),
         ("study.toml", "study.toml: is a sweep; allowed: a scene, or: rotor-mbs sweep study.toml"),
+        (
+            "map.toml",
+            "map.toml: is a mapping of columns; allowed: a scene, or: rotor-mbs compare DATA "
+            "--scene SCENE --columns map.toml",
+        ),
+        ("columns.toml", "columns.toml: is a mapping of columns; allowed: a scene, or: "),
+        ("bounds.toml", "bounds.toml: is a file of bounds; allowed: a scene, or: "),
     ],
 )
 def test_arguments_that_name_no_scene(
@@ -289,6 +296,9 @@ def test_arguments_that_name_no_scene(
     Path("study.toml").write_text(
         'scene = "paper/fig11"\n[[axis]]\nkey = "gravity"\nvalues = [1]\n', encoding="utf-8"
     )
+    Path("map.toml").write_text('time = "t"\nrotor = "x"\n', encoding="utf-8")
+    Path("columns.toml").write_text('[rotor]\ncolumn = "x"\n', encoding="utf-8")
+    Path("bounds.toml").write_text('[[bound]]\ncheck = "error"\n', encoding="utf-8")
     with pytest.raises(InputError) as caught:
         find_scenes([argument])
     (problem,) = caught.value.problems

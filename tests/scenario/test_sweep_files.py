@@ -134,7 +134,7 @@ def test_a_scene_is_no_sweep(tmp_path: Path) -> None:
     with pytest.raises(
         InputError,
         match=(
-            r"scene\.toml: is a scene; allowed: .* rotor-mbs run "
+            r"scene\.toml: is a scene; allowed: a sweep, or: rotor-mbs run "
             r"\S+scene\.toml$"
         ),
     ):
