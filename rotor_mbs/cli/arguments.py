@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NoReturn
@@ -147,6 +148,12 @@ POSITIVE = _positive(float, "a number more than 0, at most 1e9")
 
 class _Parser(argparse.ArgumentParser):
     """An argument parser that reports bad usage in one line, without the usage before it."""
+
+    def __init__(self, *arguments: Any, **options: Any) -> None:
+        super().__init__(*arguments, **options)
+        # No option begins with a digit, so whatever looks like "-1", also "-1e-6" or "-1:3:5", is a
+        # value; argparse itself takes only plain numbers for values.
+        self._negative_number_matcher = re.compile(r"-\.?[0-9]")
 
     def error(self, message: str) -> NoReturn:
         self.exit(2, f"{self.prog}: {message}; see {self.prog} --help\n")

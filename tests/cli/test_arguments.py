@@ -52,6 +52,19 @@ def test_a_value_that_nothing_can_have_is_a_line(words: tuple[str, ...], folder:
     assert list(folder.iterdir()) == []
 
 
+@pytest.mark.usefixtures("folder")
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("modes", "paper/fig03", "--speeds", "-1:3:5"),
+        ("compare", "data.csv", "--scene", "paper/fig03", "--tolerance", "-1e-6"),
+        ("run", "paper/fig03", "--timeout", "-.5e1"),
+    ],
+)
+def test_a_negative_number_is_a_value_and_no_option(words: tuple[str, ...]) -> None:
+    assert f"{words[-2]}: '{words[-1]}' given, allowed: " in refusal(*words)
+
+
 @pytest.mark.parametrize("path", ["/", "..", "", "sweeps"])
 def test_a_path_that_is_no_sweep_is_a_line(path: str, folder: Path) -> None:
     """Their workers are started before the file is read."""
