@@ -143,6 +143,14 @@ def test_show_of_runs_that_are_not_ok_has_their_reasons(tmp_path: Path) -> None:
     assert f"paper/fig08 {METHOD} solver_failed: the step became too small" in out
 
 
+def test_show_suggests_check_only_where_it_has_something_to_check(tmp_path: Path) -> None:
+    """As of a bench, or the stability suite, whose only runs are the references."""
+    curve = rotor(np.sin, np.cos, np.sin, np.cos)
+    path = store(tmp_path / "bench.h5", [Made(paper("fig08", samples=3), "reference", curve)])
+    shown = json.loads(rotor_mbs("show", path, "--json").out)
+    assert shown["next"] == [f"rotor-mbs report {path}", f'rm.open("{path}")']
+
+
 def test_show_of_a_file_that_is_none(tmp_path: Path) -> None:
     assert "no such file" in refusal("show", tmp_path / "missing.h5")
     (tmp_path / "other.h5").write_bytes(b"x" * 100)

@@ -151,6 +151,8 @@ def _results(path: Path) -> FileSummary:
             summary.lines.append(f"... {len(failed) - _MOST_FAILED} more runs that are not ok")
         if results.scenes:
             summary.tables = [_scene_table(results.scenes.values()), method_table(runs)]
+        # A bench, the stability suite and files of references have no run that could be checked.
+        if runs:
             summary.next = [
                 (f"rotor-mbs check {path}", "accuracy verdicts; exit status 1 where one fails")
             ]
