@@ -311,9 +311,7 @@ def regressions(
     present = {(check.name, check.where): check for check in new}
     runs = {check.where[:2] for check in new}
     gone = {check.where[:2]: check for check in old if check.where[:2] not in runs}
-    kept = [
-        check for check in old if check.where[:2] in runs and check.where.scene not in changed
-    ]
+    kept = [check for check in old if check.where[:2] in runs and check.where.scene not in changed]
     lost = [
         replace(check, name="run", where=check.where._replace(channel="all"))
         for check in gone.values()

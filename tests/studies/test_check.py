@@ -238,7 +238,8 @@ def test_a_sweep_is_checked_for_methods_and_for_runs_of_an_earlier_file(tmp_path
         (tmp_path / name).mkdir()
         made_sweep(tmp_path / name, THREE_RUNS.replace("9.7, 9.8, 9.9", values))
     old, new = tmp_path / "old/s.h5", tmp_path / "new/s.h5"
-    lines_of(old, "--require", METHOD, "--against", new, status=0)
+    lines = lines_of(old, "--require", METHOD, "--against", new, status=0)
+    assert lines[-2].startswith("runs of a sweep: checked that all are there and as written; ")
     named(
         lines_of(old, "--require", "mine/lsoda", status=1),
         "FAIL required: paper/fig11",
