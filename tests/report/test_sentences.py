@@ -14,16 +14,18 @@ from support.report_pages import answer_of, facts_of, rows_of, section_of, text_
 from support.scenes import paper
 from support.stored import Made, rotor, store
 
+import rotor_mbs as rm
 from rotor_mbs.analysis.modes import SceneModes
 from rotor_mbs.api.comparisons import compare
 from rotor_mbs.errors import InputError
 from rotor_mbs.report.build import write_report
+from rotor_mbs.report.elements import Grid, Plot
 from rotor_mbs.report.files import write_page
 from rotor_mbs.report.numbers import number
 from rotor_mbs.report.pages import agreement_of_scenes, computations
 from rotor_mbs.report.pages.comparison import comparison_page, error_panels, onset_of
 from rotor_mbs.report.pages.modes import modes_page
-from rotor_mbs.runs.read import open_results
+from rotor_mbs.runs.read import Record, open_results
 from rotor_mbs.scenario.scene import scene_toml
 from rotor_mbs.studies.modes import compute_modes
 
@@ -303,6 +305,47 @@ def test_data_that_agree_are_said_to(tmp_path: Path) -> None:
     assert answer_of(text).startswith("The data agree with paper/fig03")
     assert facts_of(text)["Verdict"] == "✓ agrees"
     assert "✗" not in text
+    # Errors of zero have no curve on a logarithmic axis; there are no loads to speak of.
+    assert "Error: 0 rad in all rows." in text
+    assert "Loads" not in text
+    plots = _plots(compare(data, paper("fig03")).record)
+    assert "Error" not in [plot.name for plot in plots]
+    for plot in plots:
+        assert all(np.isfinite(curve.y).any() for curve in plot.curves)
+
+
+def test_one_row_has_no_plot_and_no_error(tmp_path: Path) -> None:
+    """Times in ms: only the first row, the initial state, lies within the scene."""
+    with open_results(results_file(tmp_path / "r.h5", ["paper/fig03"], [])) as opened:
+        run = opened.scenes["paper/fig03"].reference
+        assert run is not None
+        data = {name: run.array(name)[::200] for name in ("time", "angles", "rates")}
+    compared = compare(data | {"time": 1e3 * data["time"]}, paper("fig03"))
+    assert compared.verdict.rows == 1
+    assert _plots(compared.record) == []
+    text = text_of(compared.to_html(tmp_path / "out").parent)
+    assert facts_of(text) == {"Verdict": "✗ inaccurate", "Compared up to": "0 s | 1 row"}
+
+
+def test_data_far_from_the_reference_are_not_cut_off() -> None:
+    """Frequencies ten times too large would not be seen in a range about the reference."""
+    scene = rm.scene("stiff/nrel-5mw")
+    speeds = [0.0, 1.0, 2.0]
+    frequencies = 10.0 * compute_modes(scene, speeds).rotation["lagrange"].damped_frequencies
+    compared = compare({"speed": speeds, "frequencies": frequencies}, scene)
+    plots = _plots(compared.record)
+    assert [plot.name for plot in plots if plot.clip is not None] == []
+    assert {curve.key for plot in plots for curve in plot.curves} >= {"reference", "data"}
+
+
+def _plots(record: Record) -> list[Plot]:
+    """All plots of the page of a comparison."""
+    plots = []
+    for section in comparison_page(record).sections:
+        grids = [element for element in section.elements if isinstance(element, Grid)]
+        cards = [card for grid in grids for card in grid.cards]
+        plots += [part for card in cards for part in card if isinstance(part, Plot)]
+    return plots
 
 
 def test_data_of_which_no_channel_was_compared_have_a_page_and_no_plot(

@@ -53,6 +53,7 @@ from rotor_mbs.report.numbers import (
 from rotor_mbs.report.pages import scene_plots as draw
 from rotor_mbs.report.plots import Series
 from rotor_mbs.runs.read import Record
+from rotor_mbs.scenario.keys import counted
 from rotor_mbs.solution.defects import FLOOR_SAFETY
 
 _REFERENCE = Look(PALETTE["reference"][0], "-", "", "reference")
@@ -73,13 +74,15 @@ def comparison_page(record: Record) -> PageContent:
     is_time = verdict.axis == "time"
     onset = onset_of(record, verdict)
     marks = _marks(record, verdict, onset)
-    sections = [
-        _channel_section(record, verdict, marks),
-        _error_section(record, verdict, marks),
-        _table_section(verdict),
-        _reading_section(verdict),
-    ]
-    about = f"{typeset_title(record.attributes['title'])} · {verdict.rows} rows"
+    sections = [_table_section(record, verdict), _reading_section(verdict)]
+    if len(record.arrays[verdict.axis]) > 1:  # a curve needs two points
+        sections = [
+            _channel_section(record, verdict, marks),
+            _error_section(record, verdict, marks),
+            *sections,
+        ]
+    rows = counted(verdict.rows, "row")
+    about = f"{typeset_title(record.attributes['title'])} · {rows}"
     facts = [
         Fact(
             "Verdict",
@@ -91,11 +94,12 @@ def comparison_page(record: Record) -> PageContent:
         name = "First outside the tolerance" if is_time else "First speed outside the tolerance"
         facts.append(Fact(name, _place(onset[0], verdict), onset[1]))
     largest = max(verdict.channels, key=lambda channel: channel.error_max, default=None)
-    if largest is not None:
+    # The first row of a motion is its initial state: its error says nothing of the equations.
+    if largest is not None and (verdict.rows > 1 or not is_time):
         facts.append(
             Fact("Largest error", with_unit(largest.error_max, largest.unit), largest.name)
         )
-    compared = f"{verdict.rows} rows"
+    compared = rows
     if verdict.horizon_s is not None and verdict.horizon_s < verdict.compared_until:
         compared += f"; errors checked up to the horizon at {seconds(verdict.horizon_s)}"
     facts.append(Fact("Compared up to", _place(verdict.compared_until, verdict), compared))
@@ -281,7 +285,8 @@ def _channel_section(record: Record, verdict: DataVerdict, marks: Sequence[Mark]
                 still=len(plots) < 2,
             )
         )
-    legend = Legend([("reference", _REFERENCE), ("data", Look(INK, "-", "", "data"))])
+    drawn = {curve.key: curve.look for plot in plots for curve in plot.curves}
+    legend = Legend(list(drawn.items()))
     first, others = plots[:_CHANNELS_SHOWN], plots[_CHANNELS_SHOWN:]
     elements: list[Grid | Fold | Element] = [legend, Grid(2, [[plot] for plot in first])]
     if others:
@@ -308,18 +313,19 @@ def _error_section(record: Record, verdict: DataVerdict, marks: Sequence[Mark]) 
     """
     rows, axis = record.arrays[verdict.axis], _axis_of(record, verdict)
     channels = _drawn(verdict)
-    errors, defects = [], []
+    errors: list[Curve] = []
+    defects: list[Curve] = []
     for channel in channels:
         look = replace(_look(channel), label=channel.name)
-        name = channel_key(channel.name)
-        if f"{name}_error" in record.arrays:
-            errors.append(
-                Curve(channel.name, look, rows, draw.positive(_array(record, channel, "_error")))
-            )
-        if channel.defect_unit == "rad" and f"{name}_defect" in record.arrays:
-            defects.append(
-                Curve(channel.name, look, rows, draw.positive(_array(record, channel, "_defect")))
-            )
+        for ending, curves in (("_error", errors), ("_defect", defects)):
+            if f"{channel_key(channel.name)}{ending}" not in record.arrays:
+                continue
+            sizes = draw.positive(_array(record, channel, ending))
+            known = np.isfinite(sizes)
+            if known.any():
+                # A line needs two samples side by side.
+                dots = "" if (known[1:] & known[:-1]).any() else "only"
+                curves.append(Curve(channel.name, look, rows, sizes, dots=dots))
     plots: list[list[Element]] = []
     if errors:
         plots.append([Plot("Error", channels[0].unit, axis, errors, 240, log=True, marks=marks)])
@@ -332,9 +338,12 @@ def _error_section(record: Record, verdict: DataVerdict, marks: Sequence[Mark]) 
         plots.append(
             [Plot("Interval defect", "rad", axis, defects, 240, note, log=True, marks=allowed)]
         )
-    legend = Legend(
-        [(channel.name, replace(_look(channel), label=channel.name)) for channel in channels]
-    )
+    drawn = {curve.key: curve.look for curve in (*errors, *defects)}
+    elements: list[Grid | Element] = [Legend(list(drawn.items())), Grid(len(plots), plots)]
+    if not plots:
+        elements = []
+    if channels and all(channel.error_whole == 0.0 for channel in channels):
+        elements.append(Note(f"Error: 0 {channels[0].unit} in all rows."))
     say = (
         (
             "The defect of an interval tells where in time the data depart from the equations of "
@@ -343,15 +352,16 @@ def _error_section(record: Record, verdict: DataVerdict, marks: Sequence[Mark]) 
         if defects
         else ""
     )
-    return Section("errors", "Errors", [legend, Grid(len(plots), plots)] if plots else [], say)
+    return Section("errors", "Errors", elements, say)
 
 
-def _table_section(verdict: DataVerdict) -> Section:
+def _table_section(record: Record, verdict: DataVerdict) -> Section:
     """Return the section with the table of channels, a row each.
 
     Parameters
     ----------
-    verdict : of the comparison.
+    record : the stored comparison; its loads are the channels without interval defects.
+    verdict : of it.
     """
     table = channel_table(verdict)
     rows: list[Row] = []
@@ -362,7 +372,10 @@ def _table_section(verdict: DataVerdict) -> Section:
     heading = "Channels up to the horizon" if verdict.axis == "time" else "Channels"
     head = tuple(with_capital(text) for text in table.head)
     elements: list[Element] = [PageTable("Channels", head, rows, wide=(3, 5))]
-    if verdict.axis == "time":
+    has_loads = any(
+        f"{channel_key(channel.name)}_defect" not in record.arrays for channel in verdict.channels
+    )
+    if verdict.axis == "time" and has_loads:
         elements.append(Note("Loads: compared in all rows with those at the states of the data."))
     return Section("table", heading, elements)
 
