@@ -48,6 +48,9 @@ class TableCell:
 
 Row = Sequence[TableCell | str]
 
+# What stands in a column of numbers where there is none.
+_NO_NUMBER = ("never", "exact", "runs away", "not measured", "not reached")
+
 
 @dataclass(frozen=True)
 class PageTable:
@@ -71,8 +74,8 @@ class PageTable:
         """Return place, heading and classes of each column that is shown.
 
         The class "n" aligns numbers on the right; it is that of a column, but for the first, of
-        which more than half of the texts begin with a digit. The class "wide" hides a column on a
-        narrow page.
+        which more than half of the texts begin with a digit, words in place of a number aside. The
+        class "wide" hides a column on a narrow page.
         """
         shown = []
         for place, heading in enumerate(self.head):
@@ -84,9 +87,10 @@ class PageTable:
                 else:
                     texts.append(cell.text or cell.note or str(cell.picture))
             known = [text for text in texts if text not in ("", NOTHING)]
-            count = sum(text.lstrip("−-≤≥×✓✗ ")[:1].isdigit() for text in known)
+            plain = [text.lstrip("−-≤≥×✓✗ ") for text in known]
+            digits = [text[:1].isdigit() for text in plain if text not in _NO_NUMBER]
             classes = []
-            if place > 0 and 2 * count > len(known):
+            if place > 0 and 2 * sum(digits) > len(digits):
                 classes.append("n")
             if place in self.wide:
                 classes.append("wide")

@@ -13,8 +13,9 @@ from support.stored import rotor
 from rotor_mbs.methods.catalogue import ladders, method_names
 from rotor_mbs.report import canvas, numbers
 from rotor_mbs.report import plots as figures
-from rotor_mbs.report.elements import Curve, Horizontal, Mark, Plot
+from rotor_mbs.report.elements import Curve, Horizontal, Mark, PageTable, Plot
 from rotor_mbs.report.looks import PALETTE, Look, coordinate_look, look_of
+from rotor_mbs.report.pages.scene_plots import range_of
 from rotor_mbs.report.plots import Series, paths
 
 LOOK = Look("#0072b2", "-", "o")
@@ -219,3 +220,15 @@ def test_extremes_of_intervals_are_drawn_and_gaps_are_left_out() -> None:
 )
 def test_numbers_read_well(shown: str, wanted: str) -> None:
     assert shown.replace(numbers.SPACE, " ") == wanted
+
+
+def test_a_column_of_numbers_is_aligned_right_whatever_words_stand_among_them() -> None:
+    rows = [["a", "3 s", "holds"], ["b", "never", "1"], ["c", "never", "fails"]]
+    columns = PageTable("", ("Name", "Until", "Verdict"), rows).columns()
+    assert [classes for _, _, classes in columns] == ["", "n", ""]
+
+
+def test_a_curve_that_its_range_would_not_show_is_not_cut_off() -> None:
+    right = np.sin(TIME)
+    assert range_of(right, 1e3 * right) is not None
+    assert range_of(right, right + 1e3) is None

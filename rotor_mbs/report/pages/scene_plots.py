@@ -116,6 +116,8 @@ def jumps_of(scene: Scene) -> Jumps:
 def range_of(right: Array, other: Array) -> tuple[float, float] | None:
     """Return the range to which a plot is cut off; None where the other curve does not run away.
 
+    A curve of which that range would have no sample does not run away: it is shown whole.
+
     Parameters
     ----------
     right : the correct curve; its range and its own height on both sides are shown.
@@ -126,6 +128,8 @@ def range_of(right: Array, other: Array) -> tuple[float, float] | None:
         return None
     low, high = float(known.min()), float(known.max())
     height = max(high - low, _LEAST_HEIGHT)
+    if not ((others >= low - height) & (others <= high + height)).any():
+        return None
     if others.max() > high + _RUNAWAY * height or others.min() < low - _RUNAWAY * height:
         return low - height, high + height
     return None
