@@ -273,6 +273,17 @@ def value_at(value: Any, time: float, *, before: bool) -> float:
     return float(values[k - 1] + part * (values[k] - values[k - 1]))
 
 
+def slope_at(value: Any, time: float, *, before: bool) -> float:
+    """Return the slope of a number or table at a time, `before` or after a kink."""
+    if not isinstance(value, list):
+        return 0.0
+    times = [row[0] for row in value]
+    k = int(np.searchsorted(times, time, side="left" if before else "right"))
+    if k in (0, len(times)):
+        return 0.0
+    return float((value[k][1] - value[k - 1][1]) / (times[k] - times[k - 1]))
+
+
 # ---- equations of motion -----------------------------------------------------------------------
 
 
@@ -444,9 +455,7 @@ class Rotor:
             deflection = np.sin(deflection)
         speed = rates[1:]
         if "damper_of_error" in self.mistakes:
-            later = np.array([value_at(value, time + 1e-7, before=True) for value in self.rest])
-            earlier = np.array([value_at(value, time - 1e-7, before=False) for value in self.rest])
-            speed = speed - (later - earlier) / 2e-7
+            speed = speed - [slope_at(value, time, before=before) for value in self.rest]
         if "quadratic_damper" in self.mistakes:
             speed = speed * np.abs(speed)
         return -self.stiffness * deflection - self.damping * speed
@@ -911,8 +920,10 @@ def shift_rows(delay: float) -> Callable[[list[list[float]]], list[list[float]]]
 
 
 def extend_rows(table: list[list[float]]) -> list[list[float]]:
-    """Return a table that goes on with its last slope."""
+    """Return a table that goes on with its last slope, unless it ends with a jump."""
     (t1, v1), (t2, v2) = table[-2:]
+    if t1 == t2:
+        return table
     return [*table, [t2 + 10.0, v2 + (v2 - v1) / (t2 - t1) * 10.0]]
 
 
