@@ -388,8 +388,7 @@ _EXAMPLES = {
         "variable. Compared with a results file there is no reference and no error relative to "
         "one, there are no run times, `error_growth` and `horizon_s` only with `error_growth = "
         "true`, and scene, methods and versions are attributes instead of columns. `code` "
-        "distinguishes rows of other versions. `rotor_angle_max` is the largest magnitude; in a "
-        "results file it is the largest value, beside `rotor_angle_min`.",
+        "distinguishes rows of other versions.",
         "sweep study.toml -o sweep.h5 -j 1",
     ),
     "Modes": (

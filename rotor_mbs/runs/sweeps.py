@@ -41,14 +41,8 @@ from rotor_mbs.solution.status import code_of
 # bytes; the longest message seen has 242, of a singularity that ode45 does not pass
 MESSAGE_LENGTH = 256
 
-COLUMNS_OF_A_RUN = columns_in("sweep") | {
-    "rotor_angle_max": Column(
-        ("run",), "rad", "largest magnitude of the rotor angle over the samples"
-    ),
-    "rotor_rate_max": Column(
-        ("run",), "rad/s", "largest magnitude of the rotor rate over the samples"
-    ),
-}
+COLUMNS_OF_A_RUN = columns_in("sweep")
+_EARLIER = "the file of a sweep of an earlier version, whose runs have other columns"
 
 
 def parameter_name(key: str) -> str:
@@ -154,6 +148,9 @@ def open_sweep(
                 "one"
             )
         stored = file.tables[""]
+        if stored.computed.keys() != table.computed.keys():
+            allowed = "another output file, or remove that one"
+            raise InputError(f"{path}: {_EARLIER}; allowed: {allowed}")
         statuses = stored.statuses()
         statuses[
             (statuses == code_of("timed_out")) & (stored.column("time_limit_s") < time_limit_s)
@@ -235,12 +232,15 @@ class StoredSweep:
                 raise StoreError(f"{place}: its attribute {name} is no list of texts; damaged")
         self.shape = parsed(self.attributes.get("shape"), list, place)  # of a grid, slowest first
         self.settings = parsed(self.attributes.get("settings"), dict, place)
-        parameters = map(parameter_name, self.attributes["parameter_keys"])
-        missing = {*COLUMNS_OF_A_RUN} - {*table.computed} | {*parameters} - {*table.known}
-        if missing or "time" not in table.known or "method_code" not in table.known:
+        columns = sorted({*COLUMNS_OF_A_RUN} - {*table.computed})
+        if columns:
             raise StoreError(
-                f"{place}: has no {', '.join(sorted(missing)) or 'time or method_code'}; damaged"
+                f"{place}: has no {', '.join(columns)}: {_EARLIER}; allowed: to compute it again"
             )
+        parameters = map(parameter_name, self.attributes["parameter_keys"])
+        missing = sorted({*parameters, "time", "method_code"} - {*table.known})
+        if missing:
+            raise StoreError(f"{place}: has no {', '.join(missing)}; damaged")
         runs, codes = table.column("run"), table.column("method_code")
         if (
             runs.dtype.kind != "i"

@@ -138,13 +138,19 @@ METRICS = {
         "1/s", "growth rate of a pitch angle that stays zero in the reference"
     ),
     "rotor_angle_min": RowValue(
-        "rad", f"smallest rotor angle (signed) over the samples; {_OWN_POINTS}", is_main=True
+        "rad",
+        f"smallest rotor angle (signed) over the samples; {_OWN_POINTS}",
+        "runs sweep",
+        is_main=True,
     ),
     "rotor_angle_max": RowValue(
         "rad",
         f"largest rotor angle (signed) over the samples; {_OWN_POINTS}",
         "runs sweep",
         is_main=True,
+    ),
+    "rotor_angle_size_max": RowValue(
+        "rad", f"largest magnitude of the rotor angle over the samples; {_OWN_POINTS}", "sweep"
     ),
     "rotor_rate_max": RowValue(
         "rad/s",
@@ -412,6 +418,19 @@ def largest(values: Array) -> Array:
         magnitudes = np.abs(values)
         result = magnitudes.max(axis=1, initial=0.0, where=np.isfinite(magnitudes))
     return result
+
+
+def extremes(values: Array) -> tuple[Array, Array]:
+    """Return the smallest and the largest value of each row of (k, n) values, twice (k,).
+
+    Samples that are not finite are ignored.
+    """
+    lows, highs = values.min(axis=1), values.max(axis=1)
+    if not (np.isfinite(lows) & np.isfinite(highs)).all():
+        is_known = np.isfinite(values)
+        lows = values.min(axis=1, initial=np.inf, where=is_known)
+        highs = values.max(axis=1, initial=-np.inf, where=is_known)
+    return lows, highs
 
 
 def energy_drifts(scenes: Sequence[Scene], kinetic: Array, work: Array, errors: Array) -> Array:

@@ -44,6 +44,7 @@ from rotor_mbs.solution.metrics import (
     Metrics,
     defect_metrics,
     energy_drifts,
+    extremes,
     horizon,
     largest,
     running_growth,
@@ -176,23 +177,31 @@ def _judged_row(chunk: Chunk, run: Solution) -> Rows:
     judged = replace(
         run, status=judgement.status, message=judgement.message, metrics=judgement.metrics
     )
-    extremes = {
-        name: values[0] for name, values in _extremes(run.angles[None], run.rates[None]).items()
-    }
-    return row_of_run(judged, chunk.place, extremes)
+    # Extremes of the samples, and of the rotor those that the judgement has found, which for the
+    # printed equations are over the integrator's own output points.
+    found: Metrics = {}
+    for name, values in _extremes(run.angles[None], run.rates[None]).items():
+        found[name] = float(values[0])
+    found |= {name: value for name, value in judged.metrics.items() if name in found}
+    found["rotor_angle_size_max"] = max(-found["rotor_angle_min"], found["rotor_angle_max"])
+    return row_of_run(judged, chunk.place, found)
 
 
 def _extremes(angles: Array, rates: Array) -> dict[str, Array]:
-    """Return the largest angle and rate of the rotor, and pitch angle, of each run, by name.
+    """Return the extremes of angle and rate of the rotor, and of the pitches, of each run, by name.
 
     Parameters
     ----------
     angles, rates : (runs, samples, 1 + blades) rad and rad/s, rotor first.
     """
+    lows, highs = extremes(angles[:, :, 0])
+    pitches = [largest(angles[:, :, i]) for i in range(1, angles.shape[2])]
     return {
-        "rotor_angle_max": largest(angles[:, :, 0]),
+        "rotor_angle_min": lows,
+        "rotor_angle_max": highs,
+        "rotor_angle_size_max": np.maximum(-lows, highs),
         "rotor_rate_max": largest(rates[:, :, 0]),
-        "pitch_max": np.max([largest(angles[:, :, i]) for i in range(1, angles.shape[2])], axis=0),
+        "pitch_max": np.max(pitches, axis=0),
     }
 
 

@@ -13,11 +13,13 @@ import h5py
 import numpy as np
 import pytest
 from support.commands import refusal, rotor_mbs
-from support.sweeps import made_sweep, run_local, starts_file
+from support.sweeps import THREE_RUNS, made_sweep, run_local, starts_file
 
 import rotor_mbs as rm
+from rotor_mbs.errors import StoreError
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.processes.pool import SerialPool
+from rotor_mbs.runs import sweeps
 from rotor_mbs.runs.design import MISSING
 from rotor_mbs.runs.rows import Rows, text_of
 from rotor_mbs.runs.sweeps import StoredSweep
@@ -61,6 +63,38 @@ def test_side_by_side_or_not_the_runs_are_the_same(tmp_path: Path) -> None:
         assert (file["energy_drift_max"][()] < 1e-11).all()
         assert file.attrs["seed"] == 0
         assert not {"error_growth", "horizon_s"} & set(file)  # not asked for
+
+
+_EXTREMES = ("rotor_angle_min", "rotor_angle_max", "rotor_rate_max")
+
+
+@pytest.mark.parametrize("method", ["lagrange/taylor", "lagrange/dop853", "printed/ode45"])
+def test_extremes_of_the_rotor_are_those_of_a_run(method: str) -> None:
+    """The rotor swings about -2 rad and stays below zero, so that a magnitude is no maximum."""
+    if method == "lagrange/taylor":
+        pytest.importorskip("heyoka")
+    scene = rm.scene("paper/fig11").replace(duration=0.3, samples=11, **{"initial.rates[0]": -1.0})
+    swept = rm.sweep(scene, {"initial.angles[0]": [-2.0]}, methods=[method])[0].metrics
+    run = rm.run(scene.replace(**{"initial.angles[0]": -2.0}), method)
+    # side by side or not: rounding of 0.3 s
+    for name in _EXTREMES:
+        assert swept[name] == pytest.approx(run.metrics[name], rel=1e-12)
+    assert swept["rotor_angle_max"] < 0.0 < swept["rotor_angle_size_max"]
+    assert swept["rotor_angle_size_max"] == -swept["rotor_angle_min"]
+
+
+def test_a_sweep_whose_maximum_was_a_magnitude_is_refused(tmp_path: Path) -> None:
+    columns = dict(sweeps.COLUMNS_OF_A_RUN)
+    for name in ("rotor_angle_min", "rotor_angle_size_max"):
+        del columns[name]
+    with patch.object(sweeps, "COLUMNS_OF_A_RUN", columns):
+        path = made_sweep(tmp_path, THREE_RUNS)
+    before = path.read_bytes()
+    for arguments in (["check", path], ["sweep", tmp_path / "s.toml", "-o", path, "-j", "1"]):
+        assert "of an earlier version" in refusal(*arguments)
+    with pytest.raises(StoreError, match=r"rotor_angle_min, rotor_angle_size_max: .* version"):
+        rm.open(path)
+    assert path.read_bytes() == before
 
 
 def test_a_finished_sweep_makes_nothing_again_and_another_one_is_refused(tmp_path: Path) -> None:

@@ -274,7 +274,7 @@ def run_quantities(sweep: _Sweep) -> list[RunQuantity]:
         speed = np.asarray(stored.column("rates"), float)[:, -1, 0]
         found.append(RunQuantity("rotor speed at the end", "rad/s", speed))
     left_out = {*map(parameter_name, sweep.keys), *_COUNTS, "time_limit_s", "code", "crc32"}
-    order = ("pitch_max", "rotor_rate_max", "rotor_angle_max")
+    order = ("pitch_max", "rotor_rate_max", "rotor_angle_size_max")
     names = [
         name
         for name, column in stored.columns.items()
