@@ -5,15 +5,15 @@ This is the Python API. Modules are loaded on first use.
 
     scenes, scene, load      names of the shipped scenes; a shipped scene; a scene from a TOML file
     scene_from_openfast      the scene of an OpenFAST model's rotor
-    run                      simulate a scene with one method (`Run`) or several (`Runs`)
-    sweep                    run a parameter study (`Runs`)
+    run                      simulate a scene with one method (`Run`) or several (`Results`)
+    sweep                    run a parameter study (`Results`)
     compare                  compare data of another program with a scene (`DataComparison`)
     check                    check the accuracy of stored runs (`Checks`)
     bench                    measure error against run time (`BenchCurves`)
     test_method              examine a method of one's own (`Checks`)
     export                   export a scene for MuJoCo or Exudyn, or its reference as CSV
     modes                    natural frequencies, damping and mode shapes over rotor speed (`Modes`)
-    open                     open any file that the program wrote (`Runs`, `Modes`, ...)
+    open                     open any file that the program wrote (`Results`, `Modes`, ...)
 
 Examples
 --------
@@ -40,8 +40,8 @@ if TYPE_CHECKING:
     from rotor_mbs.api.files import open as open
     from rotor_mbs.api.modes import Modes as Modes
     from rotor_mbs.api.modes import modes as modes
-    from rotor_mbs.api.runs import Run as Run
-    from rotor_mbs.api.runs import Runs as Runs
+    from rotor_mbs.api.results import Results as Results
+    from rotor_mbs.api.results import Run as Run
     from rotor_mbs.api.runs import load as load
     from rotor_mbs.api.runs import run as run
     from rotor_mbs.api.runs import scene as scene
@@ -63,7 +63,8 @@ _MODULES = {
     "rotor_mbs.api.comparisons": "compare DataComparison",
     "rotor_mbs.api.files": "open",
     "rotor_mbs.api.modes": "modes Modes",
-    "rotor_mbs.api.runs": "load run Run Runs scene scenes sweep",
+    "rotor_mbs.api.results": "Results Run",
+    "rotor_mbs.api.runs": "load run scene scenes sweep",
     "rotor_mbs.errors": "InputError MethodRefusal RotorError StoreError",
     "rotor_mbs.methods.base": "Method",
     "rotor_mbs.scenario.openfast_scene": "scene_from_openfast",

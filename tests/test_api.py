@@ -18,7 +18,7 @@ SHORT = {"duration": 1.0, "samples": 101}
 
 
 @pytest.fixture(scope="module")
-def study() -> rm.Runs:
+def study() -> rm.Results:
     scene = rm.scene("paper/fig08").replace(**SHORT)
     return rm.run(scene, ["lagrange/dop853", "exudyn_tree/rk67", "exudyn_chain/generalized_alpha"])
 
@@ -67,7 +67,7 @@ def test_a_scene_of_ones_own_gets_a_computed_reference(tmp_path: Path) -> None:
     assert run.metrics["angle_error_max"] < 1e-10
 
 
-def test_labels_units_and_values_of_xarray(study: rm.Runs) -> None:
+def test_labels_units_and_values_of_xarray(study: rm.Results) -> None:
     data = study.to_xarray()
     run = study["exudyn_tree/rk67"]
     chosen = data.angles.sel(run="exudyn_tree/rk67", coordinate="pitch 1")
@@ -83,15 +83,47 @@ def test_labels_units_and_values_of_xarray(study: rm.Runs) -> None:
     assert data.constraint_error.sel(run="exudyn_chain/generalized_alpha").notnull().all()
 
 
-def test_two_models_differ_by_what_the_plot_and_the_table_show(study: rm.Runs) -> None:
+def test_two_models_differ_by_what_the_plot_and_the_table_show(study: rm.Results) -> None:
     drawn = study.plot.error().figure.axes[0]
     labels = [text.get_text() for text in drawn.get_legend().get_texts()]
     assert labels == ["closed form, DOP853", "Exudyn tree, RK67", "Exudyn chain, generalized-α"]
     runs = [run for name, run in study.items() if name != "reference"]
     for line, run in zip(drawn.get_lines(), runs, strict=False):
         assert np.nanmax(line.get_ydata()) == run.metrics["angle_error_whole"]
-    assert all(f"{run.metrics['angle_error_max']:.1e}" in str(study.table()) for run in runs)
+    assert all(f"{run.metrics['angle_error_max']:.1e}" in repr(study) for run in runs)
     assert study.statuses == {"ok": 4}
+
+
+def test_runs_of_any_kind_have_a_table_with_units_and_are_the_same_after_saving(
+    study: rm.Results, tmp_path: Path
+) -> None:
+    """Runs of a scene, of two scenes and of a sweep: labels, numbers, statuses, arrays."""
+    scene = study["lagrange/dop853"].scene
+    swept = rm.sweep(scene, {"gravity": [9.0, 9.8]}, methods=METHOD, samples=5)
+    other = rm.run(scene.replace(gravity=9.0), [METHOD])
+    for number, runs in enumerate((study, swept, other)):
+        again = rm.open(runs.save(tmp_path / f"{number}.h5"))
+        table = again.table()
+        assert list(again) == list(runs) == list(table.index)
+        assert table.equals(runs.table())
+        assert again.statuses == {"ok": len(runs)} == table.status.value_counts().to_dict()
+        for label, run in again.items():
+            stored = {name: table[name][label] for name in run.metrics}
+            assert stored == run.metrics
+            assert (table.status[label], table.method_name[label]) == (run.status, run.method)
+        for name, unit in (("defect_max", "rad"), ("time_reached", "s"), ("status", "1")):
+            assert table.attrs[name]["units"] == unit
+        assert "largest defect" in table.attrs["defect_max"]["long_name"]
+        angles = np.array([run.angles for run in again.values()])
+        np.testing.assert_array_equal(again.column("angles"), angles)
+        np.testing.assert_array_equal(again.at("angles", -1), angles[:, -1])
+        data = again.to_xarray()
+        assert data.status.values.tolist() == table.status.tolist()
+        np.testing.assert_array_equal(data.angles, angles)
+    assert swept.table().gravity.tolist() == [9.0, 9.8]
+    assert swept.table().attrs["gravity"]["units"] == "m/s^2"
+    with pytest.raises(rm.InputError, match="unstack: nothing is varied"):
+        study.to_xarray(unstack=True)
 
 
 def test_a_solution_has_its_quantities_status_and_metrics() -> None:
@@ -109,7 +141,7 @@ def test_a_solution_has_its_quantities_status_and_metrics() -> None:
     )
 
 
-def test_runs_are_saved_opened_and_rendered(study: rm.Runs, tmp_path: Path) -> None:
+def test_runs_are_saved_opened_and_rendered(study: rm.Results, tmp_path: Path) -> None:
     file = rm.open(study.save(tmp_path / "deep" / "study.h5"))
     assert list(file) == list(study)
     for name, run in study.items():
@@ -193,7 +225,9 @@ def test_a_sweep_gives_labelled_runs_of_each_parameter_value(tmp_path: Path) -> 
         "10000",
         "3",
     ]
-    with pytest.raises(rm.InputError, match=r"of a sweep only that of a run, runs\[0\]\.plot\(\)"):
+    with pytest.raises(
+        rm.InputError, match=r"only of the runs of one scene; allowed: results\[0\]\.plot,"
+    ):
         _ = data.plot
     assert data[1].status == "ok"
     assert data[1].metrics["defect_max"] == data.column("defect_max")[1]

@@ -47,8 +47,8 @@ class World(NamedTuple):
 
     scene: rm.Scene
     run: rm.Run
-    runs: rm.Runs
-    sweep: rm.Runs
+    runs: rm.Results
+    sweep: rm.Results
     modes: Any
     comparison: Any
     panels: Any
@@ -92,8 +92,8 @@ CALLS: dict[str, Call] = {
     "scene name": Call(lambda _, v: rm.scene(v)),
     "load path": Call(lambda _, v: rm.load(v)),
     "open path": Call(lambda _, v: rm.open(v)),
-    "Runs path": Call(lambda _, v: rm.Runs(v)),
-    "Runs scene": Call(lambda w, v: rm.Runs(w.runs.path, v)),
+    "Results path": Call(lambda _, v: rm.Results(v)),
+    "Results scene": Call(lambda w, v: rm.Results(w.runs.path, v)),
     "run scene": Call(lambda _, v: rm.run(v, METHOD)),
     "run method": Call(lambda w, v: rm.run(w.scene, v), {"list", "dict", "empty"}),
     "run method file": Call(
@@ -159,14 +159,14 @@ CALLS: dict[str, Call] = {
     "plot save ending": Call(
         lambda w, v: w.panels.save(f"{v}.png" if isinstance(v, str) else v), {"text"}
     ),
-    "Runs item": Call(lambda w, v: w.runs[v], is_lookup=True),
-    "Runs item of a sweep": Call(lambda w, v: w.sweep[v], {"True"}, is_lookup=True),
-    "Runs column": Call(lambda w, v: w.sweep.column(v)),
-    "Runs column, no sweep": Call(lambda w, v: w.runs.column(v)),
-    "Runs at name": Call(lambda w, v: w.sweep.at(v, 0)),
-    "Runs at sample": Call(lambda w, v: w.sweep.at("angles", v), {"True", "-1"}),
-    "Runs save": Call(lambda w, v: w.runs.save(v), {"text"}),
-    "Runs to_html": Call(lambda w, v: w.runs.to_html(v), {"text"}),
+    "Results item": Call(lambda w, v: w.runs[v], is_lookup=True),
+    "Results item of a sweep": Call(lambda w, v: w.sweep[v], {"True"}, is_lookup=True),
+    "Results column": Call(lambda w, v: w.sweep.column(v)),
+    "Results column, no sweep": Call(lambda w, v: w.runs.column(v)),
+    "Results at name": Call(lambda w, v: w.sweep.at(v, 0)),
+    "Results at sample": Call(lambda w, v: w.sweep.at("angles", v), {"True", "-1"}),
+    "Results save": Call(lambda w, v: w.runs.save(v), {"text"}),
+    "Results to_html": Call(lambda w, v: w.runs.to_html(v), {"text"}),
     "Modes to_xarray": Call(lambda w, v: w.modes.to_xarray(v)),
     "Modes save": Call(lambda w, v: w.modes.save(v), {"text"}),
     "Modes to_html": Call(lambda w, v: w.modes.to_html(v), {"text"}),
@@ -206,7 +206,7 @@ def frames(error: BaseException) -> list[str]:
     return list(dict.fromkeys(names))
 
 
-SLOW = ("Runs to_html", "run method")  # draws a report; computes references
+SLOW = ("Results to_html", "run method")  # draws a report; computes references
 
 
 @pytest.mark.parametrize(

@@ -29,7 +29,7 @@ def _scene() -> Scene:
     return rm.scene("paper/fig08").replace(duration=0.2, samples=11)
 
 
-def _sweep(**options: Any) -> rm.Runs:
+def _sweep(**options: Any) -> rm.Results:
     return rm.sweep(
         _scene(), **{"parameters": {"gravity": [9.0, 9.8]}, "methods": [METHOD], **options}
     )
@@ -230,7 +230,7 @@ def test_limits_of_threads_do_not_end_each_other() -> None:
     ids=["copy", "deepcopy", "pickle"],
 )
 def test_a_copy_outlives_its_original(
-    make: Callable[[], rm.Runs], copied: Callable[[rm.Runs], rm.Runs]
+    make: Callable[[], rm.Results], copied: Callable[[rm.Results], rm.Results]
 ) -> None:
     runs = make()
     twin, label, before = copied(runs), list(runs)[-1], runs[list(runs)[-1]].angles

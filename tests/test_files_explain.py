@@ -246,7 +246,7 @@ def test_the_short_table_of_a_scene_is_of_its_own_runs(
     files: dict[str, Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Also where it has so many that it is one of methods."""
-    monkeypatch.setattr("rotor_mbs.api.runs.MOST_ROWS", 1)
+    monkeypatch.setattr("rotor_mbs.api.results.MOST_ROWS", 1)
     runs = rm.open(files["many"])
     assert f"{METHOD}  " in repr(runs)
     assert "6 of 6 ok" in repr(runs)
@@ -436,7 +436,7 @@ def test_a_changed_scene_says_so_wherever_its_name_stands(tmp_path: Path) -> Non
     two = rm.open(store(tmp_path / "two.h5", [Made(scene, METHOD, curve), other]))
     assert repr(one).startswith(f"{label}: ")
     assert repr(one[METHOD]).startswith(f"{label}: ")
-    assert label in str(two.table())
+    assert label in repr(two)
     sweep = tmp_path / "sweep.h5"
     rm.sweep(
         scene.replace(duration=0.1),

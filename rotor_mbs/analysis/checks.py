@@ -89,7 +89,7 @@ def checks_of(results: OpenResults, frozen: Sequence[OpenResults], bounds: Bound
                 try:
                     # Any error in a run that is known to be damaged is due to the damage.
                     with reading(str(scene.name), run.method) if run.is_damaged else nullcontext():
-                        faults, solution = run.faults(scene.scene), run.solution(scene.scene)
+                        faults, solution = run.faults(), run.solution()
                         checks += _of_run(
                             run, own, solution, faults, scene.reference_trajectory, motion_ends
                         )
@@ -110,7 +110,7 @@ def checks_of(results: OpenResults, frozen: Sequence[OpenResults], bounds: Bound
 
 
 def _where(run: StoredRun, channel: str) -> Where:
-    return Where(run.scene, run.method, channel)
+    return Where(run.scene_name, run.method, channel)
 
 
 def _of_run(

@@ -145,7 +145,7 @@ def _results(path: Path) -> FileSummary:
         failed = [run for run in runs if run.status not in GOOD and is_corrected(run.method)]
         for run in failed[:_MOST_FAILED]:
             reason = str(run.attributes.get("message", ""))
-            text = f"{run.scene} {run.method} {run.status}{': ' if reason else ''}{reason}"
+            text = f"{run.scene_name} {run.method} {run.status}{': ' if reason else ''}{reason}"
             summary.lines += textwrap.wrap(text, _WIDTH, subsequent_indent="  ")
         if len(failed) > _MOST_FAILED:
             summary.lines.append(f"... {len(failed) - _MOST_FAILED} more runs that are not ok")

@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from rotor_mbs.analysis.text_tables import TextTable, bench_table
-from rotor_mbs.api.runs import TemporaryFolder, refuse_losses, texts
+from rotor_mbs.api.results import TemporaryFolder
+from rotor_mbs.api.runs import refuse_losses, texts
 from rotor_mbs.errors import InputError, MethodRefusal, shown_value
 from rotor_mbs.methods.catalogue import check_names
 from rotor_mbs.processes import cores

@@ -20,7 +20,7 @@ def open(path: str | os.PathLike[str]) -> Any:
 
     Returns
     -------
-    Runs
+    Results
         For a results file or a sweep. The labels of a file with one scene are method names.
     Modes, DataComparison
         For a file of modes, or of comparisons; if it has several, a dict by scene, or by scene and
@@ -59,7 +59,7 @@ def open(path: str | os.PathLike[str]) -> Any:
         from rotor_mbs.api.benches import BenchCurves
 
         return BenchCurves(file)
-    from rotor_mbs.api.runs import Runs
+    from rotor_mbs.api.results import Results
 
-    runs = Runs(file)
-    return Runs(file, runs.scenes[0]) if kind == RESULTS and len(runs.scenes) == 1 else runs
+    runs = Results(file)
+    return Results(file, runs.scenes[0]) if kind == RESULTS and len(runs.scenes) == 1 else runs

@@ -18,16 +18,17 @@ from __future__ import annotations
 import functools
 import math
 import os
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor_mbs.errors import StoreError
+from rotor_mbs.errors import StoreError, shown_value
 from rotor_mbs.methods.catalogue import PRINTED, REFERENCE, is_built_in, is_corrected
 from rotor_mbs.runs.arrays import chosen_group
 from rotor_mbs.runs.design import (
@@ -75,16 +76,18 @@ class StoredRun:
 
     Attributes
     ----------
-    scene, method : names.
+    scene_name, method : names.
     known : columns of the design by name: settings, versions, ...
     scales : time, coordinate, blade, axis, as far as they exist.
     """
 
-    scene: str
+    scene_name: str
     method: str
     known: Mapping[str, Any]
     scales: Mapping[str, NDArray[Any]]
     _place: RowLocation
+    _read_scene: Callable[[], Scene]
+    _read_reference: Callable[[], Trajectory | None] = lambda: None
     _file: IO[bytes] | None = None
     _verify: bool = True
 
@@ -109,7 +112,17 @@ class StoredRun:
 
     @property
     def _name(self) -> str:
-        return f"{self._place.path}: {self.scene}/{self.method}"
+        return f"{self._place.path}: {self.scene_name}/{self.method}"
+
+    @functools.cached_property
+    def scene(self) -> Scene:
+        """Return its scene. Raises InputError if what is stored is no scene."""
+        return self._read_scene()
+
+    @property
+    def reference(self) -> Trajectory | None:
+        """Return the samples of the reference in the file; None without one, and for itself."""
+        return None if self.method == REFERENCE else self._read_reference()
 
     @functools.cached_property
     def attributes(self) -> dict[str, Any]:
@@ -128,6 +141,10 @@ class StoredRun:
             ):
                 facts[name] = number
         return facts
+
+    def verify(self) -> None:
+        """Raise StoreError if the row has changed after it was written."""
+        _ = self._row
 
     @property
     def is_frozen(self) -> bool:
@@ -217,7 +234,7 @@ class StoredRun:
         """Return an array or a scale, or None if the run has none of that name."""
         return self._arrays.get(name)
 
-    def faults(self, scene: Scene, *, complete: bool = True) -> list[str]:
+    def faults(self, *, complete: bool = True) -> list[str]:
         """Return a line for every array that is missing or wrong.
 
         A frozen reference needs only its angles, rates and what cannot be derived from them; a
@@ -225,10 +242,9 @@ class StoredRun:
 
         Parameters
         ----------
-        scene : the scene of the run.
         complete : whether every sample must exist; if not, as many as there are times.
         """
-        faults = []
+        scene, faults = self.scene, []
         rows = len(self.array("time")) if "time" in self else scene.samples
         if complete and rows != scene.samples:
             faults.append(f"{rows} of {scene.samples} samples" if rows else "no samples")
@@ -261,27 +277,22 @@ class StoredRun:
                 )
         return faults
 
-    def trajectory(self, scene: Scene) -> Trajectory | None:
+    def trajectory(self) -> Trajectory | None:
         """Return the samples of the run, or None if its arrays cannot be used.
 
         Angles and rates that are not stored are NaN.
         """
-        if self.faults(scene, complete=False):
+        if self.faults(complete=False):
             return None
-        time = self.array("time")
+        scene, time = self.scene, self.array("time")
         blank = np.full((len(time), 1 + len(scene.blades)), np.nan)
         names = {quantity.name for quantity in known_quantities(scene.outputs)}
         arrays = {name: np.asarray(self.array(name), float) for name in names if name in self}
         return Trajectory(**{"time": time, "angles": blank, "rates": blank, **arrays})
 
-    def solution(self, scene: Scene) -> Solution | None:
-        """Return the run as the Solution that was stored, or None if its arrays cannot be used.
-
-        Parameters
-        ----------
-        scene : the scene of the run.
-        """
-        trajectory, facts = self.trajectory(scene), self.attributes
+    def solution(self) -> Solution | None:
+        """Return the run as the Solution that was stored, or None if its arrays cannot be used."""
+        trajectory, facts = self.trajectory(), self.attributes
         if trajectory is None:
             return None
         # A frozen reference has no report of its engine, and of a sweep's runs none is stored.
@@ -297,7 +308,7 @@ class StoredRun:
             out_of_time=self.status == "timed_out" and not success,
         )
         return Solution(
-            scene,
+            self.scene,
             self.method,
             trajectory,
             integration,
@@ -337,7 +348,7 @@ class StoredScene:
 
         It is None if there is none, or its arrays cannot be used.
         """
-        return None if self.reference is None else self.reference.trajectory(self.scene)
+        return None if self.reference is None else self.reference.trajectory()
 
     @functools.cached_property
     def changes(self) -> list[SceneChange] | None:
@@ -457,30 +468,124 @@ def open_results(
     raise StoreError(f"{path}: is being replaced by another process")
 
 
-def run_names(path: Path) -> list[tuple[str, str]]:
-    """Return scene and method of every stored run, in the order of `open_results`.
+class StoredRuns:
+    """The runs of a results file, or of one of its scenes; it is open only while it is read.
 
-    Parameters
+    `StoredSweep` has the same members for the runs of a sweep.
+
+    Attributes
     ----------
-    path : a results file.
-
-    Raises
-    ------
-    StoreError
-        If it cannot be read.
+    labels : of the stored runs, in the order of `open_results`: method names for one scene,
+        otherwise "scene/method".
+    scenes : names of the scenes.
+    subsets : names of the scenes whose runs can be selected.
+    group : of the arrays over time; None for several scenes.
+    keys : of varied parameters, which a results file does not have.
     """
-    stored = opened_tables(path, {RUNS})
-    if RUNS not in stored.tables:
-        return []
-    runs = stored.tables[RUNS]
-    methods: dict[str, list[str]] = {}
-    with reading(path):
-        for status, row in zip(
-            runs.column("status").tolist(), runs.known_rows.values(), strict=True
-        ):
-            if status != MISSING:
-                methods.setdefault(str(row["scene"]), []).append(str(row["method_name"]))
-    return [(scene, method) for scene in natural_order(methods) for method in methods[scene]]
+
+    keys: Sequence[str] = ()
+
+    def __init__(self, path: Path, scene: str = "") -> None:
+        """Read the labels of the runs.
+
+        Parameters
+        ----------
+        path : a results file.
+        scene : name of a scene; "" for all.
+
+        Raises
+        ------
+        StoreError
+            If the file cannot be read, or has no such scene.
+        """
+        self._path = path
+        tables = opened_tables(path, {RUNS}).tables
+        methods: dict[str, list[str]] = {}
+        if RUNS in tables:
+            with reading(path):
+                statuses = tables[RUNS].column("status").tolist()
+                for status, row in zip(statuses, tables[RUNS].known_rows.values(), strict=True):
+                    if status != MISSING:
+                        methods.setdefault(str(row["scene"]), []).append(str(row["method_name"]))
+        self.scenes = natural_order(methods)
+        if scene:
+            if scene not in methods:
+                allowed = ", ".join(self.scenes)
+                raise StoreError(f"{path}: has no scene {shown_value(scene)}; allowed: {allowed}")
+            self.scenes = [scene]
+        self.subsets, self.group = self.scenes, scene or None
+        self._names: dict[str, tuple[str, str]] = {}  # scene and method by label
+        for name in self.scenes:
+            for method in methods[name]:
+                self._names[method if scene else f"{name}/{method}"] = name, method
+
+    @property
+    def labels(self) -> list[str]:
+        """Return the labels of the stored runs."""
+        return list(self._names)
+
+    @functools.cached_property
+    def title(self) -> str:
+        """Return the scene's name with the changes to a shipped one; "" for several scenes."""
+        if self.group is None:
+            return ""
+        with open_results(self._path, only=[self.group]) as results:
+            return results.scenes[self.group].label
+
+    @contextmanager
+    def opened_run(self, label: str) -> Iterator[StoredRun]:
+        """Open the file and yield a run. Raises StoreError if it is not there any more."""
+        scene, method = self._names[label]
+        with open_results(self._path, only=[scene]) as results:
+            if scene not in results.scenes or method not in results.scenes[scene].runs:
+                raise StoreError(
+                    f"{self._path}: has no {scene}/{method} any more: another file has taken its "
+                    "place"
+                )
+            yield results.scenes[scene].runs[method]
+
+    def verify(self) -> None:
+        """Raise StoreError if a run has changed after it was written."""
+        with open_results(self._path, only=self.scenes) as results:
+            for scene in results.scenes.values():
+                for run in scene.runs.values():
+                    run.verify()
+
+    @property
+    def columns(self) -> dict[str, Column]:
+        """Return the columns of the runs by name; for one scene also those of its arrays."""
+        columns: dict[str, Column] = {}
+        for table in reversed(self._tables()):
+            columns = {**table.columns, **columns}
+        return columns
+
+    def values(self, name: str, sample: int | None = None) -> NDArray[Any]:
+        """Return a column of all runs, (runs, ...), in the order of the labels; or a scale.
+
+        Parameters
+        ----------
+        name : of the column.
+        sample : number of the sample of an array over time; None for the whole column.
+
+        Raises
+        ------
+        StoreError
+            If there is no such column.
+        """
+        for table in self._tables():
+            if name in table.columns:
+                rows = [
+                    table.row_of[f"{scene}/{method}" if table.group == RUNS else method]
+                    for scene, method in self._names.values()
+                ]
+                return table.rows(name, rows, sample)
+        raise StoreError(f"{self._path}: has no {shown_value(name)}")
+
+    def _tables(self) -> list[StoredTable]:
+        """Return the table of the runs' numbers, then that of the scene's arrays."""
+        groups = [RUNS] if self.group is None else [self.group, RUNS]
+        tables = opened_tables(self._path, groups).tables
+        return [tables[group] for group in reversed(groups) if group in tables]
 
 
 def run_arrays(path: Path, group: str = "", scene: str = "") -> dict[str, NDArray[Any]]:
@@ -523,16 +628,25 @@ def _scenes(
     runs = stored.tables[RUNS]
     file.seek(runs.offsets["status"])
     statuses = np.frombuffer(file.read(len(runs.runs)), np.int8)
-    by_scene: dict[str, dict[str, StoredRun]] = {}
+    scenes: dict[str, StoredScene] = {}
     for status, (run, known) in zip(statuses, runs.known_rows.items(), strict=True):
-        scene, method = str(known["scene"]), str(known["method_name"])
-        if status == MISSING or (only is not None and scene not in only):
+        name, method = str(known["scene"]), str(known["method_name"])
+        if status == MISSING or (only is not None and name not in only):
             continue
-        scales = {name: values for name, (_, values) in stored.tables[scene].known.items()}
-        stored_run = StoredRun(scene, method, known, scales, stored.place(run), file, verify)
-        by_scene.setdefault(scene, {})[method] = stored_run
-    for scene, methods in by_scene.items():
-        yield StoredScene(scene, dict(stored.tables[scene].attributes), methods)
+        table = stored.tables[name]
+        scene = scenes.setdefault(name, StoredScene(name, dict(table.attributes), {}))
+        scene.runs[method] = StoredRun(
+            name,
+            method,
+            known,
+            {scale: values for scale, (_, values) in table.known.items()},
+            stored.place(run),
+            partial(getattr, scene, "scene"),
+            partial(getattr, scene, "reference_trajectory"),
+            file,
+            verify,
+        )
+    yield from scenes.values()
 
 
 _MESSAGE_LENGTH = 300

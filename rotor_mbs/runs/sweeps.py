@@ -16,13 +16,14 @@ import re
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor_mbs.errors import InputError, StoreError, shown_value
+from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.runs.design import MISSING, TableSpec, columns_in, flags, scene_scales
 from rotor_mbs.runs.hdf5 import Column, reading
@@ -174,7 +175,11 @@ class StoredSweep:
     columns : every dataset by name, scales included.
     keys : of the varied parameters.
     damaged_runs : numbers of the stored runs whose checksums are wrong.
+    subsets, group : as of `StoredRuns`: runs are not selected by scene, and arrays are at the root.
     """
+
+    subsets: Sequence[str] = ()
+    group = ""
 
     def __init__(self, path: Path, *, allow_damaged_runs: bool = False) -> None:
         """Read the dataset, and verify all its runs.
@@ -198,12 +203,7 @@ class StoredSweep:
             )
         self._table = table = file.tables[""]
         self._check()
-        known = {name: column for name, (column, _) in table.known.items()}
-        self.columns = {
-            "run": Column(("run",), "1", "run number, from 0"),
-            **known,
-            **table.computed,
-        }
+        self.columns = {"run": Column(("run",), "1", "run number, from 0"), **table.columns}
         self.keys: list[str] = self.attributes["parameter_keys"]
         with reading(path):
             is_damaged = (table.column("status") != MISSING) & (table.statuses() == MISSING)
@@ -252,6 +252,40 @@ class StoredSweep:
             raise StoreError(f"{place}: method_code names no method; damaged")
 
     @functools.cached_property
+    def _stored_rows(self) -> NDArray[np.intp]:
+        """Return the rows of the stored runs."""
+        return np.flatnonzero(np.asarray(self._table.column("status")) != MISSING)
+
+    @property
+    def labels(self) -> list[int]:
+        """Return the numbers of the stored runs."""
+        numbers: list[int] = self._table.column("run")[self._stored_rows].tolist()
+        return numbers
+
+    @property
+    def scenes(self) -> list[str]:
+        """Return the name of the scene that is varied."""
+        return [str(self.attributes["base_scene"])]
+
+    @property
+    def title(self) -> str:
+        """Return a title for a sweep without a file of the user."""
+        return f"sweep of {self.base_scene.label}"
+
+    @contextmanager
+    def opened_run(self, label: int) -> Iterator[StoredRun]:
+        """Yield the run with a number, as `StoredRuns.opened_run` yields that of a label."""
+        with reading(self._path):
+            yield self.run(int(label))
+
+    def verify(self) -> None:
+        """Do nothing: all runs were verified when the dataset was opened."""
+
+    def values(self, name: str, sample: int | None = None) -> NDArray[Any]:
+        """Return a column of the stored runs, or a scale; see `StoredRuns.values`."""
+        return self._table.rows(name, self._stored_rows, sample)
+
+    @functools.cached_property
     def base_scene(self) -> Scene:
         """Return the scene that is varied. Raises InputError if its text is no scene."""
         return parse_scene(str(self.attributes["scene_toml"]), str(self.attributes["base_scene"]))
@@ -267,9 +301,6 @@ class StoredSweep:
 
         Raises StoreError if there is none of that name.
         """
-        if name not in self.columns:
-            what = f"has no {shown_value(name)}"
-            raise StoreError(f"{self._path}: {what}; allowed: a sweep whose outputs have it")
         return self._table.column(name)
 
     def scene_of(self, number: int) -> Scene:
@@ -285,7 +316,12 @@ class StoredSweep:
         method = self.methods[int(self.column("method_code")[row])]
         known = {"settings": self.attributes["settings"]}
         return StoredRun(
-            str(self.attributes["base_scene"]), method, known, scales, self._table.place(row)
+            str(self.attributes["base_scene"]),
+            method,
+            known,
+            scales,
+            self._table.place(row),
+            partial(self.scene_of, number),
         )
 
     def _row_of(self, number: int) -> int:

@@ -30,7 +30,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor_mbs.errors import StoreError
+from rotor_mbs.errors import StoreError, shown_value
 from rotor_mbs.methods.catalogue import REFERENCE
 from rotor_mbs.runs.design import (
     COLUMNS,
@@ -68,6 +68,11 @@ class StoredTable(TableSpec):
     inode: int
     offsets: Mapping[str, int]
 
+    @property
+    def columns(self) -> dict[str, Column]:
+        """Return the descriptions of its columns and scales, by name, without that of `run`."""
+        return {name: column for name, (column, _) in self.known.items()} | {**self.computed}
+
     def column(self, name: str) -> NDArray[Any]:
         """Return a column or a scale of the table, (rows, ...).
 
@@ -87,7 +92,8 @@ class StoredTable(TableSpec):
         if name in self.known:
             return np.asarray(self.known[name][1])
         if name not in self.computed:
-            raise StoreError(f"{self.path}: has no {name}; allowed: a sweep whose outputs have it")
+            what = f"has no {shown_value(name)}"
+            raise StoreError(f"{self.path}: {what}; allowed: a sweep whose outputs have it")
         kind, shape = self.row_type[name].base, self.shape(name)
         if not all(shape):
             return np.empty(shape, kind)
@@ -96,6 +102,27 @@ class StoredTable(TableSpec):
                 raise StoreError(f"{self.path}: has been replaced by another file")
             values: NDArray[Any] = np.memmap(file, kind, "r", self.offsets[name], shape)
         return values
+
+    def rows(
+        self, name: str, rows: Sequence[int] | NDArray[np.intp], sample: int | None = None
+    ) -> NDArray[Any]:
+        """Return some rows of a column, (rows, ...); a scale such as `time` as a whole.
+
+        Parameters
+        ----------
+        name : of the column.
+        rows : their numbers.
+        sample : number of the sample of an array over time; None for all.
+
+        Raises
+        ------
+        StoreError
+            If there is no such column.
+        """
+        column = self.column(name)
+        if name in self.known and self.known[name][0].dimensions[:1] != ("run",):
+            return np.array(column)
+        return np.array(column[rows] if sample is None else column[rows, sample])
 
     def statuses(self) -> NDArray[np.int8]:
         """Return the verified status of each row, (rows,) int8.

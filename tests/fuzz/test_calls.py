@@ -30,7 +30,7 @@ def scene(number: int) -> Scene:
     return scene if number % 2 else pickle.loads(pickle.dumps(scene))
 
 
-def swept(number: int, **options: object) -> rm.Runs:
+def swept(number: int, **options: object) -> rm.Results:
     values = (0.1 * i for i in range(number % 3 + 1))
     return rm.sweep(
         scene(number), {"initial.angles[1]": values}, methods=[METHOD], samples=3, **options

@@ -356,9 +356,9 @@ def test_a_changed_number_of_a_finished_sweep_is_found(
         StoredSweep(copy)
     assert "runs 0 changed" in refusal("report", copy, "-o", tmp_path / "report")
     for read in (
-        partial(rm.Runs.column, name="time"),
-        partial(rm.Runs.at, name="angles", sample=0),
-        rm.Runs.to_xarray,
+        partial(rm.Results.column, name="time"),
+        partial(rm.Results.at, name="angles", sample=0),
+        rm.Results.to_xarray,
     ):
         with pytest.raises(StoreError, match="runs 0 changed"):
             read(rm.open(copy))
