@@ -25,6 +25,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.analysis.text_tables import TextTable
+from rotor_mbs.analysis.whirl import (
+    HERTZ,
+    RPM,
+    FixedFrame,
+    fixed_frame,
+    nodal_diameters,
+    whirl,
+)
 from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.runs.hdf5 import Column, reading
 from rotor_mbs.runs.read import Record, read_records
@@ -271,20 +279,6 @@ def in_order_of(first: ModeSet, other: ModeSet) -> ModeSet:
     return ModeSet(other.eigenvalues[order], other.shapes[order])
 
 
-def whirl_frequencies(
-    frequency: Array, speed: Array, harmonic: Array | int = 1
-) -> tuple[Array, Array]:
-    """Return the backward and forward whirl frequencies in rad/s, as the base sees them.
-
-    Parameters
-    ----------
-    frequency : rad/s, of a cosine and sine mode in the rotor's frame.
-    speed : rad/s, of the rotor.
-    harmonic : number k of the coordinates cosine_k and sine_k.
-    """
-    return np.abs(frequency - harmonic * speed), frequency + harmonic * speed
-
-
 def floquet(
     transition: Array, flow: Array, gradient: Array, speed: float
 ) -> tuple[Complex, Complex]:
@@ -338,6 +332,11 @@ AGREEMENT = 1e-8
 # Share to which the modes of a source satisfy its own equations: six digits are printed.
 PRINTED_PRECISION = 1e-6
 _NOTE_WIDTH = 130  # characters, of a summary's lines: as wide as its table
+# Of a rotor that no drive holds: what `rotor` and the collective mode are.
+_FREE_SHAFT = (
+    "the shaft is free: `rotor` turns all blades together, and the collective pitch moves the "
+    "rotor, too (rotor/pitch); a whirl moves no rotor"
+)
 _SHOWN_ROWS = 24  # of a summary: three states of eight modes
 # Eigenvalues below this share of the largest are not compared themselves: they are square roots of
 # the small difference of stiffnesses, which is rounding where nothing holds the rotor. Their
@@ -435,26 +434,38 @@ class LinearModes(ModeSet):
         return float(max(abs(value) ** 2 + abs(value) * damping + stiffness, self.weights, 1e-300))
 
     @property
-    def multiblade_shapes(self) -> Complex:
-        """Return the shapes by rotor and multiblade coordinate, (speeds, n, 1 + blades)."""
+    def whole_shapes(self) -> Complex:
+        """Return the shapes by rotor and blade, (speeds, n, 1 + blades); 0 where none moves."""
         whole = np.zeros((len(self.speeds), len(self.coordinates), 1 + self.blades), dtype=complex)
         columns = [
             0 if name == "rotor" else int(name.rpartition(" ")[2]) for name in self.coordinates
         ]
         whole[:, :, columns] = self.shapes
-        return multiblade_shapes(whole)
+        return whole
+
+    @property
+    def multiblade_shapes(self) -> Complex:
+        """Return the shapes by rotor and multiblade coordinate, (speeds, n, 1 + blades)."""
+        return multiblade_shapes(self.whole_shapes)
+
+    @property
+    def nodal_diameters(self) -> NDArray[np.int64]:
+        """Return the nodal diameters of each mode, (n,); -1 where its shape has several."""
+        return nodal_diameters(self.whole_shapes)
 
     @property
     def whirl(self) -> tuple[Array, Array]:
-        """Return the backward and forward whirl frequencies, (speeds, n) rad/s.
+        """Return the backward and forward whirl frequencies of each mode, (speeds, n) rad/s.
 
-        They are those of cosine and sine modes; NaN for other modes.
+        They are those in the fixed frame, NaN for a mode that does not whirl.
         """
-        harmonics = np.full(len(self.names), np.nan)
-        for k, name in enumerate(self.names):
-            if name.startswith(("cosine", "sine")):  # "cosine pitch", "cosine 2 pitch"
-                harmonics[k] = int(name.split()[1]) if name.split()[1].isdigit() else 1
-        return whirl_frequencies(self.damped_frequencies, self.speeds[:, None], harmonics)
+        shapes, values = self.whole_shapes, self.eigenvalues[..., 0]
+        return whirl(shapes, values, self.damped_frequencies, self.speeds)
+
+    @property
+    def fixed_frame(self) -> FixedFrame | str:
+        """Return the motions in the rotating and in the fixed frame, or why there is no whirl."""
+        return fixed_frame(self.names, self.whole_shapes, self.damped_frequencies, self.speeds)
 
 
 @dataclass(frozen=True)
@@ -487,7 +498,7 @@ class FloquetTable:
     def growth_rates(self) -> Array:
         """Return the growth rate that follows from the largest multiplier, (speeds,) 1/s."""
         with np.errstate(divide="ignore"):
-            return np.asarray(np.log(self.largest) * self.speeds / (2.0 * np.pi))
+            return np.asarray(np.log(self.largest) * np.abs(self.speeds) / (2.0 * np.pi))
 
 
 @dataclass(frozen=True)
@@ -600,7 +611,8 @@ def _difference(first: LinearModes, other: LinearModes) -> float:
 def mode_rows(modes: SceneModes) -> list[dict[str, object]]:
     """Return a row for each state, speed and mode of the closed form.
 
-    Speeds and frequencies are in rad/s, growth in 1/s; a number that does not exist is None.
+    Speeds and frequencies are in rad/s, growth in 1/s; a number that does not exist is None. Whirl
+    frequencies are those in the fixed frame, all others in the rotating frame.
 
     Parameters
     ----------
@@ -608,11 +620,14 @@ def mode_rows(modes: SceneModes) -> list[dict[str, object]]:
     """
     rows: list[dict[str, object]] = []
     for linear in modes.closed_form:
+        backward, forward = linear.whirl
         numbers = {
             "undamped_frequency": linear.undamped_frequencies,
             "damped_frequency": linear.damped_frequencies,
             "damping_ratio": linear.damping_ratios,
             "growth_rate": linear.growth_rates,
+            "backward_whirl_frequency": backward,
+            "forward_whirl_frequency": forward,
         }
         state = "at rest" if linear.kind == REST else "steady rotation without gravity"
         for i, speed in enumerate(linear.speeds.tolist()):
@@ -658,6 +673,65 @@ def mode_table(rows: Sequence[Mapping[str, object]]) -> TextTable:
     return TextTable(head, cells)
 
 
+def campbell_table(linear: LinearModes, places: Sequence[int] | None = None) -> TextTable:
+    """Return frequencies in Hz over the rotor speed in rpm, in both frames.
+
+    A row for each speed and motion; where no whirl is defined, one for each speed and mode, in the
+    rotating frame alone. The last column but one has the frequency in the fixed frame as a multiple
+    of the rotor speed.
+
+    Parameters
+    ----------
+    linear : modes over speed.
+    places : of the speeds that are shown; all if None.
+    """
+    frame = linear.fixed_frame
+    speeds = linear.speeds
+    shown = range(len(speeds)) if places is None else places
+    if isinstance(frame, str):
+        frequencies = linear.damped_frequencies * HERTZ
+        rows = []
+        for i in shown:
+            for k, name in enumerate(linear.names):
+                cells = (
+                    speeds[i] * RPM,
+                    frequencies[i, k],
+                    _multiple(frequencies[i, k], speeds[i]),
+                )
+                rows.append((f"{cells[0]:.6g}", name, *map(_printed, cells[1:])))
+        return TextTable(("speed (rpm)", "mode", "rotating frame (Hz)", "per rev"), rows)
+    rows = []
+    for i in shown:
+        for k, name in enumerate(frame.names):
+            fixed = frame.fixed[i, k] * HERTZ
+            diameter = str(abs(int(frame.diameters[k])))
+            numbers = frame.rotating[i, k] * HERTZ, fixed, _multiple(fixed, speeds[i])
+            share = frame.rotor_share[i, k]
+            rows.append(
+                (f"{speeds[i] * RPM:.6g}", name, diameter, *map(_printed, numbers), _printed(share))
+            )
+    head = (
+        "speed (rpm)",
+        "motion",
+        "nodal diameters",
+        "rotating frame (Hz)",
+        "fixed frame (Hz)",
+        "per rev",
+        "rotor/pitch",
+    )
+    return TextTable(head, rows)
+
+
+def _multiple(hertz: float, speed: float) -> float:
+    """Return a frequency (Hz) as a multiple of the rotor speed (rad/s); NaN at rest."""
+    return hertz / (abs(speed) * HERTZ) if speed else math.nan
+
+
+def _printed(value: float) -> str:
+    """Return a number with six digits, "" for NaN."""
+    return f"{value:.6g}" if math.isfinite(value) else ""
+
+
 @np.errstate(all="ignore")
 def mode_summary(modes: SceneModes) -> str:
     """Return the modes of a scene as text: numbers, stability, and whether models agree.
@@ -678,6 +752,14 @@ def mode_summary(modes: SceneModes) -> str:
         lines += ["", str(mode_table(shown[:_SHOWN_ROWS]))]
     if len(shown) > _SHOWN_ROWS:
         lines.append(f"... {len(shown) - _SHOWN_ROWS} more rows")
+    for linear in list(modes.rotation.values())[:1]:
+        places = sorted({0, len(linear.speeds) - 1})
+        table = campbell_table(linear, places)
+        lines += ["", str(TextTable(table.head, table.rows[:_SHOWN_ROWS]))]
+        if len(table.rows) > _SHOWN_ROWS:
+            lines.append(f"... {len(table.rows) - _SHOWN_ROWS} more rows")
+        frame = linear.fixed_frame
+        lines.append(f"fixed frame: {frame}" if isinstance(frame, str) else _FREE_SHAFT)
     if modes.floquet is not None:
         stable = modes.floquet.stable
         unstable, unknown = int((stable == 0).sum()), int((stable == -1).sum())
@@ -715,6 +797,7 @@ def _linear_datasets(linear: LinearModes) -> Datasets:
     mode, shape = partial(Column, ("speed", "mode")), linear.multiblade_shapes
     component = Column(("component",), "1", "rotor and multiblade coordinates")
     n, (backward, forward) = np.arange(len(linear.coordinates)), linear.whirl
+    frame = linear.fixed_frame
     entry, part = (
         partial(Column, ("speed", "equation", "coordinate")),
         partial(Column, ("speed", "mode", "component")),
@@ -723,7 +806,7 @@ def _linear_datasets(linear: LinearModes) -> Datasets:
         partial(Column, ("speed", "mode", "root")),
         partial(Column, ("speed", "mode", "coordinate")),
     )
-    return {
+    datasets = {
         "speed": (linear.speeds, _SPEED),
         "mode": (n, Column(("mode",), "1", "number of the mode")),
         "coordinate": (n, Column(("coordinate",), "1", "coordinate with inertia")),
@@ -757,11 +840,11 @@ def _linear_datasets(linear: LinearModes) -> Datasets:
         ),
         "backward_whirl_frequency": (
             backward,
-            mode("rad/s", "damped frequency minus k times rotor speed, of cosine_k, sine_k"),
+            mode("rad/s", "damped frequency in the fixed frame, seen as a backward whirl"),
         ),
         "forward_whirl_frequency": (
             forward,
-            mode("rad/s", "damped frequency plus k times rotor speed, of cosine_k, sine_k"),
+            mode("rad/s", "damped frequency in the fixed frame, seen as a forward whirl"),
         ),
         "eigenvalue_real": (linear.eigenvalues.real, root("1/s", "eigenvalue, real part")),
         "eigenvalue_imag": (linear.eigenvalues.imag, root("1/s", "eigenvalue, imaginary part")),
@@ -777,7 +860,36 @@ def _linear_datasets(linear: LinearModes) -> Datasets:
             linear.damping,
             entry("1/s", "inverse mass matrix times damping and gyroscopic matrix"),
         ),
+        "nodal_diameter": (
+            linear.nodal_diameters,
+            Column(("mode",), "1", "nodal diameters of the mode shape, -1: several", "<i8"),
+        ),
     }
+    if linear.kind == ROTATION and isinstance(frame, FixedFrame):
+        motion = partial(Column, ("speed", "motion"))
+        datasets |= {
+            "motion": (
+                np.arange(len(frame.names)),
+                Column(("motion",), "1", "number of the motion in the fixed frame"),
+            ),
+            "motion_diameter": (
+                frame.diameters,
+                Column(("motion",), "1", "nodal diameters, below 0: backward whirl", "<i8"),
+            ),
+            "rotating_frame_frequency": (
+                frame.rotating,
+                motion("rad/s", "damped frequency of the motion in the rotating frame"),
+            ),
+            "fixed_frame_frequency": (
+                frame.fixed,
+                motion("rad/s", "damped frequency of the motion in the fixed frame"),
+            ),
+            "rotor_share": (
+                frame.rotor_share,
+                motion("1", "amplitude of the rotor's angle over the largest of the pitches"),
+            ),
+        }
+    return datasets
 
 
 def to_records(modes: SceneModes) -> list[Record]:
@@ -851,6 +963,7 @@ def _linear_record(scene: str, linear: LinearModes, common: Mapping[str, Any]) -
     linear : modes of the source.
     common : attributes that all records of the scene have.
     """
+    frame = linear.fixed_frame
     attributes = {
         **common,
         "label": linear.label,
@@ -861,6 +974,8 @@ def _linear_record(scene: str, linear: LinearModes, common: Mapping[str, Any]) -
         "messages": list(linear.messages),
         "weights": linear.weights,
     }
+    if linear.kind == ROTATION and isinstance(frame, FixedFrame):
+        attributes["motion_labels"] = list(frame.names)
     return _record(scene, f"{linear.source}/{linear.kind}", attributes, _linear_datasets(linear))
 
 
@@ -978,4 +1093,6 @@ def _modes_of(of_all: Sequence[Record]) -> dict[str, SceneModes]:
         )
         # arrays that do not fit together raise here
         assert isinstance(modes_by_scene[scene].agrees, bool)
+        for linear in modes_by_scene[scene].closed_form:
+            assert linear.fixed_frame
     return modes_by_scene

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from rotor_mbs.analysis.modes import (
     SceneModes,
+    campbell_table,
     linear_dataset,
     mode_rows,
     mode_summary,
@@ -41,7 +42,7 @@ def modes(scene: Scene | str | os.PathLike[str], speeds: Sequence[float] = ()) -
     Parameters
     ----------
     scene : a Scene, the name of a shipped scene, or a TOML file.
-    speeds : rotor speeds (rad/s), increasing, at least 0.
+    speeds : rotor speeds (rad/s), increasing; below 0 the rotor turns the other way.
 
     Returns
     -------
@@ -50,7 +51,7 @@ def modes(scene: Scene | str | os.PathLike[str], speeds: Sequence[float] = ()) -
     Raises
     ------
     InputError
-        For speeds that do not increase, or are negative, and for a scene without a steady state.
+        For speeds that do not increase, and for a scene without a steady state.
     TypeError
         If `scene` is neither a scene nor text nor a path, or a speed is no number.
 
@@ -62,6 +63,8 @@ def modes(scene: Scene | str | os.PathLike[str], speeds: Sequence[float] = ()) -
     (True, ['lagrange', 'exudyn_tree'])
     >>> study.rotation["lagrange"].names
     ('rotor', 'collective pitch', 'cosine pitch', 'sine pitch')
+    >>> study.rotation["lagrange"].fixed_frame.names
+    ('rotor', 'collective pitch', 'backward whirl', 'forward whirl')
     """
     return Modes(**vars(compute_modes(scene_of(scene), increasing_speeds(speeds))))
 
@@ -82,7 +85,8 @@ class Modes(SceneModes):
     Attributes
     ----------
     rest, rotation : modes by model, at rest under gravity, and over speed without gravity; the
-        closed form first.
+        closed form first. `fixed_frame` of one has names and frequencies (rad/s) of collective
+        mode, backward and forward whirl in both frames, or is a text that says why there are none.
     floquet : Floquet multipliers under gravity; None if not computed.
     notes : results that could not be computed, with the reason.
     agrees, disagreement : whether the modes of the models agree and satisfy their own equations,
@@ -103,9 +107,25 @@ class Modes(SceneModes):
     def table(self) -> TextTable:
         """Return a table with a row per state, speed and mode of the closed form.
 
-        Frequencies are in rad/s, decay rates in 1/s; damping ratios have no unit.
+        Frequencies are in rad/s (damped ones also in Hz) in the rotating frame, decay rates in
+        1/s; damping ratios have no unit. See `campbell` for Hz over rpm, and the fixed frame.
         """
         return mode_table(mode_rows(self))
+
+    def campbell(self) -> TextTable:
+        """Return frequencies in Hz over the rotor speed in rpm, by the closed form.
+
+        They are those in the rotating and in the fixed frame, the latter also as multiples of the
+        rotor speed; where no whirl is defined, those in the rotating frame.
+
+        Raises
+        ------
+        InputError
+            Where no modes over speed were computed.
+        """
+        for linear in self.rotation.values():
+            return campbell_table(linear)
+        raise InputError(f"{self.scene}: no modes over speed; allowed: modes computed with speeds")
 
     def to_xarray(self, state: str = "rotation") -> Any:
         """Return the modes of one state as an xarray.Dataset; its dimension `solver` is the model.

@@ -6,6 +6,7 @@ A command's code is imported when the command is called.
 from __future__ import annotations
 
 import argparse
+import math
 import os
 import re
 from collections.abc import Callable, Sequence
@@ -71,12 +72,13 @@ def folder(text: str) -> Path:
     return output
 
 
-def span(text: str) -> tuple[float, ...]:
-    """Return COUNT equally spaced speeds from FROM to TO, both included.
+def span(text: str, unit: float = 1.0) -> tuple[float, ...]:
+    """Return COUNT equally spaced speeds from FROM to TO, both included, in rad/s.
 
     Parameters
     ----------
-    text : "FROM:TO:COUNT", in rad/s.
+    text : "FROM:TO:COUNT".
+    unit : rad/s, of the numbers in the text.
 
     Raises
     ------
@@ -85,19 +87,30 @@ def span(text: str) -> tuple[float, ...]:
     """
     try:
         start, end, number = text.split(":")
-        first, last, count = float(start), float(end), int(number)
-        if 0.0 <= first < last <= _MAX_SPEED and 2 <= count <= _MAX_SPAN:
-            numbers = tuple(first + (last - first) * i / (count - 1) for i in range(count))
+        first, last, count = float(start) * unit, float(end) * unit, int(number)
+        if -_MAX_SPEED <= first < last <= _MAX_SPEED and 2 <= count <= _MAX_SPAN:
+            rounding = 1e-14 * max(abs(first), abs(last))
+            numbers = []
+            for i in range(count):
+                speed = first + (last - first) * i / (count - 1)
+                # 0 between a negative and a positive speed
+                numbers.append(0.0 if abs(speed) <= rounding else speed)
             # A difference of a few units of rounding has fewer numbers than COUNT; 1e-320 has an
             # infinite inverse.
-            slowest = min(number for number in numbers if number)
+            slowest = min(abs(speed) for speed in numbers if speed)
             if len(set(numbers)) == count and slowest >= _MIN_SPEED:
-                return numbers
+                return tuple(numbers)
     except ValueError:
         pass
-    allowed = f"FROM:TO:COUNT with 0 <= FROM < TO <= {_MAX_SPEED:g} and COUNT from 2 to {_MAX_SPAN}"
-    allowed += f"; speeds that differ, each 0 or at least {_MIN_SPEED:g}"
+    allowed = f"FROM:TO:COUNT with FROM < TO and COUNT from 2 to {_MAX_SPAN}"
+    allowed += f"; speeds that differ, each 0 or of a size from {_MIN_SPEED:g} to {_MAX_SPEED:g}"
+    allowed += " rad/s"
     raise _not_allowed(text, allowed)
+
+
+def span_in_rpm(text: str) -> tuple[float, ...]:
+    """Return speeds in rad/s from "FROM:TO:COUNT" in rpm, see `span`."""
+    return span(text, math.pi / 30.0)
 
 
 def part(text: str) -> tuple[int, int]:
@@ -542,8 +555,13 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     own.method(
         "method, or a Python file, whose model is compared with the closed form (default: all)"
     )
+    either = own.add_mutually_exclusive_group()
     text = "rotor speeds in rad/s, equally spaced, such as 0:3:31 (default: only at rest)"
-    own.add_argument("--speeds", type=span, default=(), metavar="FROM:TO:COUNT", help=text)
+    either.add_argument("--speeds", type=span, default=(), metavar="FROM:TO:COUNT", help=text)
+    text = "the same in rpm, such as 0:30:31"
+    either.add_argument(
+        "--rpm", type=span_in_rpm, dest="speeds", metavar="FROM:TO:COUNT", help=text
+    )
     own.output(file, "FILE", Path("modes.h5"))
     own.flag("--json", help="print the table as JSON")
     own.jobs()

@@ -84,8 +84,8 @@ def modes_of_scenes(
     Raises
     ------
     InputError
-        For speeds that do not increase or are negative, for a method that is not linearized, and if
-        `output` holds another kind of results.
+        For speeds that do not increase, for a method that is not linearized, and if `output` holds
+        another kind of results.
     StoreError
         If `output` cannot be written, or was not written by this program.
     """
@@ -141,15 +141,15 @@ def compute_modes(
     """Return all modes of a scene.
 
     They are those at rest under gravity, those in steady rotation without gravity at `speeds`, and
-    the Floquet multipliers of a turn under gravity at the speeds above 0. The torque on the rotor
-    is left out: the drive holds its speed. Pitch torques and rest angles are those at t = 0.
+    the Floquet multipliers of a turn under gravity at the speeds other than 0. The torque on the
+    rotor is left out: the drive holds its speed. Pitch torques and rest angles are those at t = 0.
 
     Parameters
     ----------
     scene : Scene
         The scene that is linearized.
     speeds : sequence of float
-        rad/s, increasing, at least 0.
+        rad/s, increasing; below 0 the rotor turns the other way.
     models : sequence of str
         The models beside the closed form; by default all.
 
@@ -169,7 +169,7 @@ def compute_modes(
     speeds = np.array(increasing_speeds(speeds))
     rest = _linear(scene, modal.REST, np.zeros(1), models, notes)
     rotation = _linear(scene, modal.ROTATION, speeds, models, notes) if len(speeds) else {}
-    turning = speeds[speeds > 0.0]
+    turning = speeds[speeds != 0.0]
     table = None
     if scene.gravity and len(turning):
         try:
@@ -310,33 +310,33 @@ def _steady_states(scene: Scene, kind: str, speeds: Array) -> list[_Point | str]
 
     at = scene if kind == modal.REST else replace(scene, gravity=0.0)
     # The pitches at a speed are the initial guess at the next slower one, so that one branch is
-    # followed down to rest.
+    # followed down to rest. They are the same in both directions of rotation.
     start = scene
-    points: list[_Point | str] = []
-    for speed in map(float, speeds[::-1]):
+    points: list[_Point | str] = [""] * len(speeds)
+    for place in np.argsort(-np.abs(speeds), kind="stable").tolist():
+        speed = float(speeds[place])
         try:
             angles = equilibrium(start) if kind == modal.REST else steady_rotation(start, speed)
         except InputError as exc:
-            points.append(str(exc))
+            points[place] = str(exc)
         except ZeroDivisionError:
-            points.append(f"{scene.name}: singular at {speed:g} rad/s")
+            points[place] = f"{scene.name}: singular at {speed:g} rad/s"
         else:
             start = replace(start, initial_angles=tuple(angles.tolist()))
-            points.append(
-                (replace(at, rotor_torque=()), angles, speed, holding_torque(scene, speed))
-            )
-    return points[::-1]
+            torque = holding_torque(scene, speed)
+            points[place] = (replace(at, rotor_torque=()), angles, speed, torque)
+    return points
 
 
 def _floquet_table(scene: Scene, speeds: Array) -> modal.FloquetTable:
     """Return the multipliers of the periodic motion under gravity, computed from the fastest down.
 
-    Each turn starts from the motion at the next faster speed, if that was found.
+    Each turn starts from the motion at the next faster speed of its direction, if that was found.
 
     Parameters
     ----------
     scene : with constant loads.
-    speeds : (speeds,) rad/s, increasing, above 0.
+    speeds : (speeds,) rad/s, increasing, without 0.
 
     Raises
     ------
@@ -346,11 +346,14 @@ def _floquet_table(scene: Scene, speeds: Array) -> modal.FloquetTable:
     from rotor_mbs.models.lagrange.floquet import periodic_turn
 
     # From the fastest down: the motion at a speed is the first guess for the next slower one.
-    turns: list[Turn] = []
-    for speed in map(float, speeds[::-1]):
-        turn = periodic_turn(scene, speed, turns[-1] if turns and not turns[-1].message else None)
-        turns.append(turn)
-    turns.reverse()
+    by_speed: dict[float, Turn] = {}
+    for direction in (speeds[speeds < 0.0], speeds[speeds > 0.0][::-1]):
+        guess: Turn | None = None
+        for speed in direction.tolist():
+            turn = periodic_turn(scene, speed, guess)
+            guess = None if turn.message else turn
+            by_speed[speed] = turn
+    turns = [by_speed[speed] for speed in speeds.tolist()]
     rows = []
     for turn in turns:
         every, others = modal.floquet(turn.transition, turn.flow, turn.gradient, turn.speed)
@@ -378,7 +381,7 @@ def increasing_speeds(speeds: Sequence[float] | Array) -> list[float]:
     Raises
     ------
     InputError
-        If they do not increase, or one is negative, out of range or a text without a number.
+        If they do not increase, or one is out of range or a text without a number.
     TypeError
         If one of `speeds` cannot be converted at all, such as None.
     """
@@ -386,8 +389,9 @@ def increasing_speeds(speeds: Sequence[float] | Array) -> list[float]:
         numbers = [float(speed) for speed in speeds]
     except (ValueError, OverflowError):  # a text, a whole number above 1e308
         numbers = [np.nan]
-    are_allowed = all(number == 0.0 or SMALLEST <= number <= LARGEST for number in numbers)
+    are_allowed = all(number == 0.0 or SMALLEST <= abs(number) <= LARGEST for number in numbers)
     if not are_allowed or any(after <= before for before, after in pairwise(numbers)):
-        allowed = f"increasing numbers, each 0 or from {SMALLEST:g} to {LARGEST:g} (rad/s)"
+        allowed = "increasing numbers, each 0 or of a size "
+        allowed += f"from {SMALLEST:g} to {LARGEST:g} (rad/s)"
         raise InputError(f"speeds: {shown_value(speeds)}; allowed: {allowed}")
     return numbers

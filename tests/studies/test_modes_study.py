@@ -219,14 +219,14 @@ def test_records_keep_every_number(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "speeds", [(1.0, 0.5), (-1.0,), (1.0, 1.0), (float("nan"),), ("a",), (1e-320,), (10**400,)]
+    "speeds", [(1.0, 0.5), (1.0, -1.0), (1.0, 1.0), (float("nan"),), ("a",), (1e-320,), (10**400,)]
 )
-def test_speeds_that_do_not_increase_from_zero_are_refused(speeds):
+def test_speeds_that_do_not_increase_are_refused(speeds):
     with pytest.raises(
         InputError,
         match=(
             r"speeds: .*[1na].*; allowed: increasing numbers, each "
-            r"0 or from"
+            r"0 or of a size from"
         ),
     ):
         study.compute_modes(SOFT, speeds)
@@ -392,7 +392,7 @@ def test_other_speeds_take_the_place_of_all_that_was_stored_for_the_scene(tmp_pa
         "0:3",
         "3:0:4",
         "0:3:1",
-        "-1:3:4",
+        "3:-1:4",
         "0:nan:4",
         "0:3:x",
         "0:1e300:3",

@@ -75,7 +75,7 @@ def periodic_turn(scene: Scene, speed: float, guess: Turn | None = None) -> Turn
     Parameters
     ----------
     scene : the rotor; its pitch torques and rest angles as at t = 0.
-    speed : rad/s, above 0.
+    speed : rad/s, not 0; below 0 the rotor turns the other way.
     guess : a motion at a speed nearby; steady rotation without gravity where left out.
 
     Returns
@@ -100,9 +100,9 @@ def periodic_turn(scene: Scene, speed: float, guess: Turn | None = None) -> Turn
         else:
             state, torque = guess.start * np.repeat([1.0, speed / guess.speed], n), guess.torque
         units = np.repeat([1.0, speed], n)
-        period = 2.0 * math.pi / speed
+        period = 2.0 * math.pi / abs(speed)
         shift = np.zeros(2 * n)
-        shift[0] = 2.0 * math.pi
+        shift[0] = math.copysign(2.0 * math.pi, speed)
         form, constant_loads = rotor_form(scene), loads_at_start(scene)
 
         def energy(state: Sequence[Any]) -> Any:
