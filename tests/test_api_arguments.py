@@ -143,7 +143,7 @@ CALLS: dict[str, Call] = {
     "modes scene": Call(lambda _, v: rm.modes(v)),
     # Bytes are whole numbers, a dictionary is gone through by its keys.
     "modes speeds": Call(lambda w, v: rm.modes(w.scene, v), {"bytes", "list", "dict", "empty"}),
-    "modes speed": Call(lambda w, v: rm.modes(w.scene, [v]), NUMBERS),
+    "modes speed": Call(lambda w, v: rm.modes(w.scene, [v]), {*NUMBERS, "-1"}),
     "export scene": Call(lambda _, v: rm.export(v, "mjcf", "scene.xml")),
     "export to": Call(lambda w, v: rm.export(w.scene, v, "scene.xml")),
     "export output": Call(lambda w, v: rm.export(w.scene, "mjcf", v), {"text"}),

@@ -43,6 +43,9 @@ Complex = NDArray[np.complex128]
 # A multiplier this much above 1 counts as growth: those of equal blades coincide, and rounding
 # splits a double eigenvalue by the root of 1e-16 and more.
 GROWTH = 1e-5
+# Share of the largest entry of a matrix below which an entry changes no eigenvalue by as much as
+# models may differ: its root is a hundredth of that.
+_REMAINDER = 1e-20
 
 
 @dataclass(frozen=True)
@@ -161,6 +164,12 @@ def modes_of(
         0.
     """
     n = len(stiffness)
+    # Remainders of differences, as 1e-160 beside 1: LAPACK scales rows until their sizes are equal,
+    # and a shape would consist of their rounding.
+    size = np.abs(stiffness).max(initial=0.0)
+    stiffness = np.where(np.abs(stiffness) < _REMAINDER * size, 0.0, stiffness)
+    size = max(float(np.abs(damping).max(initial=0.0)), math.sqrt(size))
+    damping = np.where(np.abs(damping) < _REMAINDER * size, 0.0, damping)
     # The equations of first order, of the positions and then the rates; without the rotor's angle,
     # which is the first coordinate, where nothing depends on it.
     matrix = np.block([[np.zeros((n, n)), np.eye(n)], [-stiffness, -damping]])

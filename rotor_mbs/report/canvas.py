@@ -59,7 +59,7 @@ if _is_imported_here and os.environ.get("MPLBACKEND"):  # for other drawings of 
         matplotlib.rcParams["backend"] = os.environ["MPLBACKEND"]
 
 WIDTH = 5.2  # in; on a telephone's 360 px a text of 9.5 points is then 9 px high
-TIME_AXIS, SPEED_AXIS = "time (s)", "rotor speed (rad/s)"
+TIME_AXIS, SPEED_AXIS, RPM_AXIS = "time (s)", "rotor speed (rad/s)", "rotor speed (rpm)"
 PRINT_WIDTH = 174.0 / 25.4  # in; two columns of a journal
 MARK = b"rotor_mbs pictures"  # in the metadata of every picture that is a file
 KINDS = ("pdf", "svg", "png")

@@ -130,6 +130,7 @@ class Curve:
     y : (n,), or (runs, n) of which one row is shown.
     breaks : samples before which the line is interrupted: the first one after a jump.
     dots : "" for a line alone; any other text marks the points; "only": no line joins them.
+    beside : text at the curve's end in the plot; "" for none.
     """
 
     key: str
@@ -138,6 +139,7 @@ class Curve:
     y: Array
     breaks: Sequence[int] = ()
     dots: str = ""
+    beside: str = ""
 
 
 @dataclass(frozen=True)
@@ -206,6 +208,8 @@ class Plot:
                 described["breaks"] = [-(-int(place) // step) for place in curve.breaks]
             if curve.dots:
                 described["dots"] = curve.dots
+            if curve.beside:
+                described["beside"] = curve.beside
             plot["curves"].append(described)
         marks = []
         for mark in self.marks:

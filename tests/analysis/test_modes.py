@@ -53,6 +53,24 @@ def test_the_growing_eigenvalue_is_the_first_of_its_mode():
         assert sorted(found.growth_rates) == pytest.approx([0.0, 3.0, 4.0], abs=1e-12)
 
 
+def test_remainders_of_differences_are_no_part_of_a_shape():
+    """As an engine's finite differences leave them where nothing couples two equal pitches."""
+    random = np.random.default_rng(2)
+    for _ in range(100):
+        stiffness, damping = np.diag([0.0, 3.6, 3.6, 4.3]), np.zeros((4, 4))
+        stiffness[0, 1:] = -2.9e-22
+        size = 10.0 ** random.uniform(-300.0, -130.0)
+        stiffness[1, 2:], stiffness[2, [1, 3]] = -1e-23 * size, 1.06e-23 * size
+        damping[1, :2], damping[2, [0, 2]] = (
+            (5e-3 * size, -2.5 * size),
+            (-5.3e-3 * size, 2.6 * size),
+        )
+        found = modes.modes_of(stiffness, damping, is_cyclic=True)
+        for values, shape in zip(found.eigenvalues, found.shapes, strict=True):
+            force = values[0] ** 2 * shape + values[0] * (damping @ shape) + stiffness @ shape
+            assert np.abs(force).max() < 1e-13
+
+
 def test_a_rotor_nothing_holds_has_an_eigenvalue_of_exact_zero():
     stiffness, damping = np.array([[0.0, 3.0], [0.0, 50.0]]), np.diag([0.2, 0.0])
     found = modes.modes_of(stiffness, damping, is_cyclic=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 from markupsafe import Markup
@@ -12,13 +13,15 @@ from markupsafe import Markup
 from rotor_mbs.analysis.modes import (
     AGREEMENT,
     GROWTH,
+    ROTATION,
     FloquetTable,
     LinearModes,
     SceneModes,
     multiblade,
 )
+from rotor_mbs.analysis.whirl import HERTZ, RPM, FixedFrame
 from rotor_mbs.errors import InputError
-from rotor_mbs.report.canvas import SPEED_AXIS, Panels, curve, log_axis, panels
+from rotor_mbs.report.canvas import RPM_AXIS, Panels, curve, log_axis, panels
 from rotor_mbs.report.elements import (
     Curve,
     Element,
@@ -63,10 +66,10 @@ class ModePlots:
         self._modes = modes
 
     def __call__(self) -> Panels:
-        """Plot the Campbell diagram: damped frequencies (rad/s) over rotor speed.
+        """Plot the Campbell diagram: damped frequencies (Hz) over the rotor speed (rpm).
 
-        Dotted lines are multiples of the speed; the lower panel has the change from the lowest
-        speed.
+        The panels have the frequencies in the rotating frame, those in the fixed frame where whirl
+        is defined, and the change from the lowest speed. Dotted lines are multiples of the speed.
 
         Raises
         ------
@@ -74,40 +77,31 @@ class ModePlots:
             Where no modes over speed were computed.
         """
         modes = self._rotation()
-        panel = panels((2.9, 1.7), SPEED_AXIS)
-        frequencies, speeds = modes.damped_frequencies, modes.speeds
-        top = float(np.nanmax(frequencies, initial=0.0)) * 1.08 or 1.0
-        apart = float(speeds[-1]) > 0.05 * top  # else the labels would lie on each other
-        # Gravity excites a blade once per revolution, a tower or a yaw error each blade in turn.
-        harmonics = sorted({1, 2, modes.blades, 2 * modes.blades})
-        for k in harmonics:
-            panel.axes[0].plot(speeds, k * speeds, color=GREY, linewidth=0.7, linestyle=":")
-            if apart or k == harmonics[-1]:
-                end = min(float(speeds[-1]), top / k)
-                panel.axes[0].text(
-                    end, k * end, f"{k}P", color=GREY, ha="right", va="bottom", fontsize=8.0
-                )
-        for k, known in enumerate(frequencies.T):
-            first = known[np.flatnonzero(np.isfinite(known))[:1]]
-            change = np.where(np.nanmax(known) > 1e-6 * top, known - first, np.nan)
-            # Markers of each mode begin at another sample: equal curves lie on each other.
-            every = (k, frequencies.shape[1] * max(1, len(speeds) // 24))
-            for axes, values in zip(panel.axes, (known, change), strict=True):
-                curve(
-                    axes,
-                    speeds,
-                    values,
-                    mode_look(k, modes.names[k]),
-                    markevery=every,
-                    markersize=4.0,
-                )
-        panel.axes[0].set_ylim(0.0, top)
-        panel.axes[0].set_ylabel("frequency (rad/s)")
-        panel.axes[1].set_ylabel("change (rad/s)")
+        motions = _motions(modes)
+        frames = {"frequency (Hz)": motions.rotating}
+        if motions.fixed is not None:
+            frames = {"rotating frame (Hz)": motions.rotating, "fixed frame (Hz)": motions.fixed}
+        panel = panels((2.6,) * len(frames) + (1.5,), RPM_AXIS)
+        rpm = modes.speeds * RPM
+        for axes, (label, frequencies) in zip(panel.axes, frames.items(), strict=False):
+            top = _top(frequencies)
+            _draw_harmonics(axes, modes, top)
+            axes.set_ylim(0.0, top)
+            axes.set_ylabel(label)
+        first = _first_known(motions.rotating)
+        is_fast = np.nanmax(motions.rotating, axis=0, initial=0.0) > _ZERO * _top(motions.rotating)
+        change = np.where(is_fast, motions.rotating - first, np.nan)
+        for axes, values in zip(panel.axes, [*frames.values(), change], strict=True):
+            for k, name in enumerate(motions.names):
+                # Markers of each mode begin at another sample: equal curves lie on each other.
+                every = (k, len(motions.names) * max(1, len(rpm) // 24))
+                look = mode_look(k, name)
+                curve(axes, rpm, values[:, k], look, markevery=every, markersize=4.0)
+        panel.axes[-1].set_ylabel("change (Hz)")
         return panel.with_legend()
 
     def damping(self) -> Panels:
-        """Plot damping ratios and growth rates (1/s) over rotor speed.
+        """Plot damping ratios and growth rates (1/s) over rotor speed (rpm).
 
         Raises
         ------
@@ -115,16 +109,17 @@ class ModePlots:
             Where no modes over speed were computed.
         """
         modes = self._rotation()
-        panel = panels((2.0, 2.0), SPEED_AXIS)
+        panel = panels((2.0, 2.0), RPM_AXIS)
         curves = {"damping ratio": modes.damping_ratios, "growth rate (1/s)": modes.growth_rates}
         for axes, (label, numbers) in zip(panel.axes, curves.items(), strict=True):
             for k, values in enumerate(numbers.T):
-                curve(axes, modes.speeds, values, replace(mode_look(k, modes.names[k]), marker=""))
+                look = replace(mode_look(k, modes.names[k]), marker="")
+                curve(axes, modes.speeds * RPM, values, look)
             axes.set_ylabel(label)
         return panel.with_legend()
 
     def multipliers(self) -> Panels:
-        """Plot moduli of the Floquet multipliers over rotor speed.
+        """Plot moduli of the Floquet multipliers over rotor speed (rpm).
 
         Raises
         ------
@@ -136,14 +131,15 @@ class ModePlots:
             raise InputError(
                 f"{self._modes.scene}: no Floquet multipliers; they need gravity and speeds above 0"
             )
-        panel = panels((2.6,), SPEED_AXIS)
+        panel = panels((2.6,), RPM_AXIS)
         axes = panel.axes[0]
+        rpm = table.speeds * RPM
         sizes = np.abs(table.multipliers)
         shown = np.where(sizes > 0.0, sizes, np.nan)
         for k, sizes_of_one in enumerate(shown.T):
             look = Look(BLUE, "", "o", "" if k else "each")
-            curve(axes, table.speeds, sizes_of_one, look, markersize=2.0, markerfacecolor=BLUE)
-        curve(axes, table.speeds, table.largest, Look(VERMILLION, "-", "", "largest"), 1.5)
+            curve(axes, rpm, sizes_of_one, look, markersize=2.0, markerfacecolor=BLUE)
+        curve(axes, rpm, table.largest, Look(VERMILLION, "-", "", "largest"), 1.5)
         axes.axhline(1.0, color=GREY, linewidth=0.8)
         known = sizes[np.isfinite(sizes) & (sizes > 0.0)]
         if len(known) and known.max() / known.min() > 10.0:
@@ -159,6 +155,68 @@ class ModePlots:
         raise InputError(
             f"{self._modes.scene}: no modes over speed; allowed: modes computed with speeds"
         )
+
+
+class _Motions(NamedTuple):
+    """Hold what a Campbell diagram shows: motions in both frames, or modes in the rotating one."""
+
+    names: tuple[str, ...]
+    rotating: Array  # (speeds, motions) Hz
+    fixed: Array | None  # (speeds, motions) Hz; None where no whirl is defined
+
+
+def _motions(linear: LinearModes) -> _Motions:
+    """Return the curves of a Campbell diagram.
+
+    Parameters
+    ----------
+    linear : modes over speed.
+    """
+    frame = linear.fixed_frame
+    if isinstance(frame, FixedFrame):
+        return _Motions(frame.names, frame.rotating * HERTZ, frame.fixed * HERTZ)
+    return _Motions(linear.names, linear.damped_frequencies * HERTZ, None)
+
+
+def _top(frequencies: Array) -> float:
+    """Return the upper end of an axis of frequencies, a little above the largest."""
+    return float(np.nanmax(frequencies, initial=0.0)) * 1.08 or 1.0
+
+
+def _first_known(frequencies: Array) -> Array:
+    """Return each column's value at the lowest speed that has one; 0 where none has."""
+    columns = [column[np.isfinite(column)][:1] for column in frequencies.T]
+    return np.array([column.sum() for column in columns])
+
+
+def _harmonics(blades: int) -> list[int]:
+    """Return the multiples of the rotor speed that are drawn: 1 to 6, and those of the blades.
+
+    Gravity and shear excite a blade once per revolution; a tower or a fixed frame is excited by
+    each blade in turn.
+    """
+    return sorted({*range(1, 7), blades, 2 * blades})
+
+
+def _draw_harmonics(axes: Any, modes: LinearModes, top: float) -> None:
+    """Draw multiples of the rotor speed as dotted lines with their numbers.
+
+    Parameters
+    ----------
+    axes : of matplotlib, frequency (Hz) over the rotor speed (rpm).
+    modes : modes over speed.
+    top : Hz, end of the vertical axis.
+    """
+    revolutions = np.abs(modes.speeds) * HERTZ
+    fastest = float(revolutions[-1])
+    multiples = _harmonics(modes.blades)
+    is_apart = fastest > 0.05 * top  # else the labels would lie on each other
+    for k in multiples:
+        axes.plot(modes.speeds * RPM, k * revolutions, color=GREY, linewidth=0.7, linestyle=":")
+        if fastest > 0.0 and (is_apart or k == multiples[-1]):
+            end = min(fastest, top / k)
+            place = math.copysign(end, modes.speeds[-1]) / HERTZ * RPM
+            axes.text(place, k * end, f"{k}P", color=GREY, ha="right", va="bottom", fontsize=8.0)
 
 
 def mode_look(index: int, name: str) -> Look:
@@ -244,12 +302,13 @@ def mode_answer(scene: SceneModes) -> list[Markup]:
                 'Under gravity its rotation is <span class="bad">unstable at {} of {} '
                 "speeds</span>, {}."
             )
-            where = text_range(number(float(unstable.min()), 3), number(float(unstable.max()), 3))
-            sentences.append(text.format(len(unstable), known_count, f"{where}{SPACE}rad/s"))
+            ends = [number(float(end) * RPM, 3) for end in (unstable.min(), unstable.max())]
+            where = f"{text_range(*ends)}{SPACE}rpm"
+            sentences.append(text.format(len(unstable), known_count, where))
         elif known_count:
             every = "all" if known_count == len(table.speeds) else f"{known_count} of"
             text = Markup("Under gravity its rotation is <b>stable at {} {} speeds</b>, up to {}.")
-            highest = f"{number(float(table.speeds[table.stable != -1].max()), 3)}{SPACE}rad/s"
+            highest = f"{number(float(table.speeds[table.stable != -1].max()) * RPM, 3)}{SPACE}rpm"
             sentences.append(text.format(every, len(table.speeds), highest))
     return sentences
 
@@ -280,8 +339,8 @@ def _facts(scene: SceneModes) -> list[Fact]:
     if rotation is not None and len(rotation.speeds) > 1:
         low, high = float(rotation.speeds[0]), float(rotation.speeds[-1])
         speeds = text_range(number(low, 3), number(high, 3))
-        rpm = text_range(number(low * 60.0 / _TURN, 3), number(high * 60.0 / _TURN, 3))
-        facts.append(Fact("Rotor speeds", f"{speeds} rad/s", f"{rpm} rev/min"))
+        rpm = text_range(number(low * RPM, 3), number(high * RPM, 3))
+        facts.append(Fact("Rotor speeds", f"{rpm} rpm", f"{speeds} rad/s"))
         damped = rotation.damping_ratios[np.isfinite(rotation.damping_ratios)]
         if len(damped) and float(np.abs(damped).max()) > _NOTHING:
             low, high = float(damped.min()), float(damped.max())
@@ -314,14 +373,7 @@ def _scene_sections(scene: SceneModes, name: str, *, with_name: bool) -> list[Se
         and len(rotation.speeds) > 1
         and not np.isnan(rotation.growth_rates).all()
     ):
-        legend, cards = _campbell(rotation, name, axis_name)
-        say = (
-            "Horizontally: rotor speed (rad/s), in steady rotation without gravity; a torque keeps "
-            "the speed. Frequencies are in the rotor's frame; 1P, 2P: multiples of the rotor speed."
-        )
-        sections.append(
-            Section(f"{name}-rotation", f"{before}Campbell diagram", [legend, Grid(2, cards)], say)
-        )
+        sections += _campbell(rotation, name, axis_name, before)
     turning = _turning(scene, name, axis_name)
     if turning is not None:
         sections.append(replace(turning, heading=f"{before}{turning.heading}"))
@@ -332,10 +384,12 @@ def _scene_sections(scene: SceneModes, name: str, *, with_name: bool) -> list[Se
     folds: list[Grid | Fold | Element] = []
     if rotation is not None:
         last = len(rotation.speeds) - 1
-        hint = f"{number(float(rotation.speeds[last]), 4)} rad/s"
+        highest = float(rotation.speeds[last])
+        hint = f"{number(highest * RPM, 4)} rpm, {number(highest, 4)} rad/s"
         folds.append(
             Fold("Modes at the highest speed", hint, [*_tables(rotation, last), Note(_FRAMES)])
         )
+        folds.append(_over_speed(rotation))
     if scene.floquet is not None:
         folds.append(
             Fold(
@@ -359,66 +413,133 @@ def _scene_sections(scene: SceneModes, name: str, *, with_name: bool) -> list[Se
     return sections
 
 
-def _campbell(
-    rotation: LinearModes, name: str, axis_name: str
-) -> tuple[Legend, list[list[Element]]]:
-    """Return the legend and the plots of frequencies, their change, and damping over speed.
+def _campbell(rotation: LinearModes, name: str, axis_name: str, before: str) -> list[Section]:
+    """Return the sections of frequencies in both frames, and of damping over speed.
 
-    Multiples of the rotor speed are drawn among the frequencies. Damping and growth are left out
-    where they are rounding error.
+    Multiples of the rotor speed are drawn among the frequencies. The fixed frame is left out where
+    no whirl is defined, damping and growth where they are rounding error.
 
     Parameters
     ----------
     rotation : modes over speed.
-    name : begins the keys of the curves.
+    name : begins the ids of the sections and the keys of the curves.
     axis_name : of the horizontal axis, which is zoomed together with others of that name.
+    before : begins the headings.
     """
-    speeds = rotation.speeds
-    axis = Horizontal(axis_name, "rad/s", "speed", float(speeds[0]), float(speeds[-1]))
-    looks = [mode_look(k, mode) for k, mode in enumerate(rotation.names)]
-    frequencies = rotation.damped_frequencies
-    top = float(np.nanmax(frequencies, initial=0.0)) * 1.08 or 1.0
+    rpm = rotation.speeds * RPM
+    axis = Horizontal(axis_name, "rpm", "speed", float(rpm[0]), float(rpm[-1]))
+    motions = _motions(rotation)
+    looks = [mode_look(k, motion) for k, motion in enumerate(motions.names)]
+    first = _first_known(motions.rotating)
+    items = [(f"{name} motion {k}", look) for k, look in enumerate(looks)]
+    multiples = ", ".join(f"{k}P" for k in _harmonics(rotation.blades))
+    items.append((f"{name} harmonics", Look(GREY, ":", "", f"{multiples} from below")))
 
-    def curves(values: Array) -> list[Curve]:
-        return [Curve(f"{name} {k}", look, speeds, values[:, k]) for k, look in enumerate(looks)]
+    def curves(values: Array, *, are_named: bool = True) -> list[Curve]:
+        names = _names_beside(values, motions.names) if are_named else [""] * len(looks)
+        drawn = []
+        for (key, look), column, beside in zip(items, values.T, names, strict=False):
+            drawn.append(Curve(key, look, rpm, column, beside=beside))
+        return drawn
 
-    harmonics = []
-    multiples = sorted({1, 2, rotation.blades, 2 * rotation.blades})
-    for k in multiples:
-        line = np.where(k * speeds <= top, k * speeds, np.nan)
-        harmonics.append(Curve(f"{name} harmonics", Look(GREY, ":", "", f"{k}P"), speeds, line))
-    # The frequency at the lowest speed at which a mode has one; the sum of none is 0.
-    first = np.array(
-        [column[np.flatnonzero(np.isfinite(column))[:1]].sum() for column in frequencies.T]
+    def diagram(title: str, values: Array) -> Plot:
+        lines = _harmonic_curves(rotation, _top(values), f"{name} harmonics")
+        # Names first: where there is no room for both, a multiple of the speed has none.
+        return Plot(title, "Hz", axis, [*curves(values), *lines], 320, still=True)
+
+    cards = [[diagram("Rotating frame", motions.rotating)]]
+    say = (
+        "Damped frequency (Hz) over the rotor speed (rpm), in steady rotation without gravity; a "
+        "torque keeps the speed. 1P, 2P, ...: multiples of the rotor speed. "
     )
-    plots = [
-        Plot(
-            "Damped frequency", "rad/s", axis, [*harmonics, *curves(frequencies)], 300, still=True
-        ),
-        Plot(
-            "Change from the lowest speed",
-            "rad/s",
-            axis,
-            curves(frequencies - first),
-            300,
-            least=1e-9 * top,
-        ),
-    ]
+    if motions.fixed is not None:
+        cards.append([diagram("Fixed frame", motions.fixed)])
+        say += _WHIRL
+    else:
+        reason = str(rotation.fixed_frame)
+        say += f"Frequencies are in the rotating frame; in the fixed frame, {reason}."
+    change = curves(motions.rotating - first, are_named=False)
+    least = 1e-9 * _top(motions.rotating)
+    cards.append([Plot("Change from the lowest speed", "Hz", axis, change, 200, least=least)])
+    section = Section(
+        f"{name}-rotation", f"{before}Campbell diagram", [Legend(items), Grid(2, cards)], say
+    )
+    damped = _damping(rotation, name, axis)
+    if damped is None:
+        return [section]
+    return [section, replace(damped, heading=f"{before}{damped.heading}")]
+
+
+def _harmonic_curves(rotation: LinearModes, top: float, key: str) -> list[Curve]:
+    """Return multiples of the rotor speed in Hz as curves with their names.
+
+    Parameters
+    ----------
+    rotation : modes over speed.
+    top : Hz, where the lines end.
+    key : of all lines.
+    """
+    rpm = rotation.speeds * RPM
+    lines = []
+    for k in _harmonics(rotation.blades):
+        # To where the line leaves the plot, which is no sample.
+        last = top / k / HERTZ * RPM
+        ends = [end for end in (-last, last) if rpm[0] < end < rpm[-1]]
+        places = np.unique([*rpm[np.abs(rpm) <= last], *ends])
+        look = Look(GREY, ":", "", f"{k}P")
+        line = k * np.abs(places) / RPM * HERTZ
+        lines.append(Curve(key, look, places, line, beside=f"{k}P"))
+    return lines
+
+
+def _names_beside(values: Array, names: Sequence[str]) -> list[str]:
+    """Return the text beside each curve: of equal curves the first has the names of all.
+
+    Parameters
+    ----------
+    values : (speeds, curves).
+    names : of the curves.
+    """
+    top = _top(values)
+    groups: list[list[int]] = []
+    for k, column in enumerate(values.T):
+        for group in groups:
+            apart = np.nanmax(np.abs(column - values[:, group[0]]), initial=0.0)
+            if apart <= _ZERO * top:
+                group.append(k)
+                break
+        else:
+            groups.append([k])
+    texts = [""] * len(names)
+    for group in groups:
+        shown = [names[k] for k in group]
+        if len(shown) > 1:
+            shown = ["whirl" if "whirl" in name else name for name in shown]
+        texts[group[0]] = ", ".join(dict.fromkeys(shown))
+    return texts
+
+
+def _damping(rotation: LinearModes, name: str, axis: Horizontal) -> Section | None:
+    """Return the section of damping and growth over speed; None where they are rounding error.
+
+    Parameters
+    ----------
+    rotation : modes over speed.
+    name : begins the id of the section and the keys of the curves.
+    axis : rotor speed in rpm.
+    """
     damping, growth = rotation.damping_ratios, rotation.growth_rates
-    if (
-        max(np.nanmax(np.abs(damping), initial=0.0), np.nanmax(np.abs(growth), initial=0.0))
-        > _NOTHING
-    ):
-        plots.append(Plot("Damping ratio", "", axis, curves(damping), 200, least=_NOTHING))
-        plots.append(Plot("Growth rate", "1/s", axis, curves(growth), 200, least=_NOTHING))
-    items = [(f"{name} {k}", look) for k, look in enumerate(looks)]
-    items.append(
-        (
-            f"{name} harmonics",
-            Look(GREY, ":", "", f"{', '.join(f'{k}P' for k in multiples)} from below"),
-        )
-    )
-    return Legend(items), [[plot] for plot in plots]
+    sizes = [np.nanmax(np.abs(values), initial=0.0) for values in (damping, growth)]
+    if max(sizes) <= _NOTHING:
+        return None
+    items = [(f"{name} {k}", mode_look(k, mode)) for k, mode in enumerate(rotation.names)]
+    cards = []
+    for title, unit, values in (("Damping ratio", "", damping), ("Growth rate", "1/s", growth)):
+        curves = []
+        for (key, look), column in zip(items, values.T, strict=True):
+            curves.append(Curve(key, look, rotation.speeds * RPM, column))
+        cards.append([Plot(title, unit, axis, curves, 200, least=_NOTHING)])
+    return Section(f"{name}-damping", "Damping over speed", [Legend(items), Grid(2, cards)])
 
 
 def _turning(scene: SceneModes, name: str, axis_name: str) -> Section | None:
@@ -433,8 +554,8 @@ def _turning(scene: SceneModes, name: str, axis_name: str) -> Section | None:
     table = scene.floquet
     if table is None or len(table.speeds) < 2 or not np.isfinite(table.largest).any():
         return None
-    speeds = table.speeds
-    axis = Horizontal(axis_name, "rad/s", "speed", float(speeds[0]), float(speeds[-1]))
+    speeds = table.speeds * RPM
+    axis = Horizontal(axis_name, "rpm", "speed", float(speeds[0]), float(speeds[-1]))
     sizes = np.abs(table.multipliers)
     shown = np.where(sizes > 0.0, sizes, np.nan)
     each = [
@@ -466,7 +587,7 @@ def _turning(scene: SceneModes, name: str, axis_name: str) -> Section | None:
     say = (
         "Under gravity a rotating rotor has no equilibrium but a periodic motion. Multipliers are "
         "the eigenvalues of its state transition matrix over one revolution; the largest excludes "
-        "those that are 1 for every such motion. For 0 rad/s see the modes at rest."
+        "those that are 1 for every such motion. For 0 rpm see the modes at rest."
     )
     return Section(f"{name}-turning", "Rotation under gravity", [Grid(2, [[plot], [rates]])], say)
 
@@ -476,11 +597,17 @@ _AT_REST = (
     "potential energy, without the torque on the rotor. The shapes of modes with equal frequencies "
     "are not unique: any linear combination of them is a mode shape."
 )
+_WHIRL = (
+    "In the fixed frame, a wave of the pitches that runs round the rotor is seen at its frequency "
+    "in the rotating frame plus the rotor speed times its nodal diameters if it runs the way the "
+    "rotor turns (forward), minus if it runs the other way (backward; absolute value). The shaft "
+    "is free: “rotor” turns all blades together, and the collective pitch moves the rotor, too."
+)
 _FRAMES = (
-    "Frequencies are in the rotor's frame; in the base frame a pair of cosine and sine modes is a "
-    "backward and a forward whirl, with the frequency decreased and increased by the rotor speed "
-    "times its number. Undamped frequency: square root of the product of a mode's two eigenvalues. "
-    "Damping ratio: minus their mean, relative to that."
+    "Frequencies are in the rotating frame, but for whirl: a pair of cosine and sine modes is a "
+    "backward and a forward whirl in the fixed frame, with the frequency decreased and increased "
+    "by the rotor speed times the nodal diameters. Undamped frequency: square root of the product "
+    "of a mode's two eigenvalues. Damping ratio: minus their mean, relative to that."
 )
 _SMALL_MOTIONS = "The geometric stiffness of the chain's constraint forces is included."
 
@@ -501,13 +628,15 @@ def _multipliers(table: FloquetTable) -> PageTable:
         numbers = ((table.growth_rates, 4), (table.product_error, 2), (table.torque, 4))
         rows.append(
             [
+                number(speed * RPM, 4),
                 number(speed, 4),
                 cell,
                 *(_shown(float(values[i]), digits) for values, digits in numbers),
             ]
         )
     head = (
-        "Speed (rad/s)",
+        "Speed (rpm)",
+        "(rad/s)",
         "largest multiplier",
         "growth rate (1/s)",
         "product minus trace",
@@ -525,14 +654,17 @@ def _tables(linear: LinearModes, i: int) -> list[PageTable]:
     i : index of the speed.
     """
     columns = {
-        "undamped (Hz)": linear.undamped_frequencies / (2.0 * math.pi),
+        "undamped (Hz)": linear.undamped_frequencies * HERTZ,
+        "damped (Hz)": linear.damped_frequencies * HERTZ,
         "undamped (rad/s)": linear.undamped_frequencies,
         "damped (rad/s)": linear.damped_frequencies,
         "damping ratio": linear.damping_ratios,
         "growth rate (1/s)": linear.growth_rates,
-        "backward whirl (rad/s)": linear.whirl[0],
-        "forward whirl (rad/s)": linear.whirl[1],
     }
+    if linear.kind == ROTATION:
+        backward, forward = linear.whirl
+        columns["backward whirl (Hz)"] = backward * HERTZ
+        columns["forward whirl (Hz)"] = forward * HERTZ
     frequencies, shapes = [], []
     for k, name in enumerate(linear.names):
         frequencies.append([name, *(_shown(float(values[i, k]), 7) for values in columns.values())])
@@ -545,6 +677,30 @@ def _tables(linear: LinearModes, i: int) -> list[PageTable]:
         PageTable(caption, ("Mode", *columns), frequencies),
         PageTable("Mode shapes", head, shapes),
     ]
+
+
+def _over_speed(rotation: LinearModes) -> Fold:
+    """Return the frequencies in Hz over the rotor speed, a table for each frame.
+
+    Parameters
+    ----------
+    rotation : modes over speed.
+    """
+    frames = {"Rotating frame (Hz)": (rotation.names, rotation.damped_frequencies)}
+    frame = rotation.fixed_frame
+    if isinstance(frame, FixedFrame):
+        frames["Fixed frame (Hz)"] = (frame.names, frame.fixed)
+    tables = []
+    for title, (names, frequencies) in frames.items():
+        rows: list[Row] = []
+        for speed, values in zip(rotation.speeds.tolist(), frequencies * HERTZ, strict=True):
+            cells = [_shown(value, 6) for value in values.tolist()]
+            rows.append([number(speed * RPM, 4), number(speed, 4), *cells])
+        tables.append(PageTable(title, ("Speed (rpm)", "(rad/s)", *names), rows))
+    elements: list[Element] = []
+    for table in tables:
+        elements += [Note(table.caption), table]
+    return Fold("Frequencies over speed", f"{len(rotation.speeds)} speeds, Hz", elements)
 
 
 def _shown(value: float, digits: int) -> str:

@@ -29,7 +29,7 @@
     return written.replace(/^-/, "−");
   };
   // As short as it can be: 5×10⁻⁴.
-  const brief = (value) => text(value, 6).replace(/(\.\d*?)0+×/, "$1×").replace(".×", "×");
+  const brief = (value) => text(value, 9).replace(/(\.\d*?)0+×/, "$1×").replace(".×", "×");
 
   // ---- Axes
 
@@ -223,6 +223,7 @@
         if (curve.dots) point(area, curve, from, to);
         if (outside >= 0 && !plot.log) leave(area, curve, outside, limits);
       });
+      label(area, shown.filter(({ beside }) => beside), from, to, limits);
       const taken = [];  // of each line of texts, where the last one ends
       marks.filter((mark) => mark.text).forEach((mark) => describe(area, mark, right, taken));
       draw(svg, "path", { class: "axis", d: `M${left} ${TOP}V${bottom}H${right}` });
@@ -235,6 +236,25 @@
         if (!(xs[i] >= from && xs[i] <= to && Number.isFinite(ys[i])) || (plot.log && ys[i] <= 0)) continue;
         draw(area, "circle", { class: style, cx: sx.at(xs[i]).toFixed(1), cy: sy.at(ys[i]).toFixed(1), r: 3 });
       }
+    };
+
+    // The texts beside the ends of curves, above or below them where there is room, else left out. Each text is drawn
+    // over all curves.
+    const label = (area, curves, from, to, [low, high]) => {
+      const boxes = [];
+      curves.forEach(({ xs, ys, beside }) => {
+        let i = ys.length - 1;
+        while (i >= 0 && !(xs[i] >= from && xs[i] <= to && ys[i] >= low && ys[i] <= high)) i--;
+        if (i < 0) return;
+        const length = LETTER * beside.length, end = Math.min(sx.at(xs[i]), width - RIGHT) - 4;
+        const start = Math.max(end - length, left + 4);
+        const isFree = (y) => y - 10 >= TOP && y + 2 <= bottom
+          && !boxes.some((box) => Math.abs(box.y - y) < 13 && box.start < start + length && start < box.end);
+        const y = [-5, 14, -19, 28].map((shift) => sy.at(ys[i]) + shift).find(isFree);
+        if (y === undefined) return;
+        boxes.push({ y, start, end: start + length });
+        draw(area, "text", { class: "quiet", x: start + length, y, "text-anchor": "end" }, beside);
+      });
     };
 
     // A curve that leaves the range says how far it goes.
