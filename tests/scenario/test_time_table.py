@@ -54,6 +54,19 @@ def test_segments_have_the_values_of_their_tables() -> None:
             assert part.loads_at(part.end) == pytest.approx(before, rel=4e-15, abs=1e-11)
 
 
+def test_values_at_many_times_have_the_bits_of_those_at_one() -> None:
+    """Before, at, between and after the rows; stored results depend on it."""
+    chance = random.Random(11)
+    for _ in range(200):
+        table = drawn_table(chance)
+        rows = [time for time, _ in table]
+        times = [*rows, *(math.nextafter(time, 0.0) for time in rows), -0.1, 1.3, math.nan]
+        times += [chance.uniform(-0.1, 1.3) for _ in range(20)]
+        at_once = values_at(table, np.array(times))
+        assert at_once.tobytes() == np.array([value_at(table, time) for time in times]).tobytes()
+    assert values_at((), np.array([0.0, 1.0])).tolist() == [0.0, 0.0]
+
+
 @pytest.mark.parametrize(
     "scene",
     find_scenes(["check/loads", "check/pitch-loads", "check/general"]),
