@@ -97,6 +97,24 @@ def test_every_evaluation_is_counted(name: str) -> None:
         assert result.steps == len(alone.t) - 1
 
 
+def test_steps_that_end_at_samples_are_more_accurate_there_than_the_interpolant() -> None:
+    """Of cos and -sin over 10 rad in some 40 steps at a tolerance of 2e-14; also where the last
+    sample is before the end, or at it. Without heyoka references are computed so."""
+    for last in (9.9, 10.0):
+        times = np.linspace(0.1, last, 99)
+        exact = np.stack([np.cos(times), -np.sin(times)], axis=1)
+        errors = []
+        for ends_at_samples in (False, True):
+            integrator = scipy_integrator("DOP853", 2.3e-14, 1e-16, ends_at_samples=ends_at_samples)
+            part = integrator(
+                lambda _, state: [state[1], -state[0]], 0.0, 10.0, np.array([1.0, 0.0]), times
+            )
+            assert part.states.shape == exact.shape
+            assert part.end == pytest.approx([np.cos(10.0), -np.sin(10.0)], abs=1e-13)
+            errors.append(np.abs(np.diff(part.states - exact, axis=0)).max())
+        assert errors[1] < 1e-15 < errors[0] / 10.0
+
+
 def test_a_state_that_has_diverged_has_no_derivative() -> None:
     scene = paper("fig03", duration=1.0, samples=2)
     solver = OdeSolver(scene, INTEGRATORS["DOP853"], np.array([0.0, 1.0]))

@@ -148,18 +148,24 @@ _OUTLOOK_SHARE = 10.0
 
 
 def scipy_integrator(
-    name: str, relative_tolerance: float, absolute_tolerance: float, max_steps: float = MAX_STEPS
+    name: str,
+    relative_tolerance: float,
+    absolute_tolerance: float,
+    max_steps: float = MAX_STEPS,
+    *,
+    ends_at_samples: bool = False,
 ) -> Integrator:
     """Return an integrator that takes the steps of one of SciPy's solvers, up to the time limit.
 
-    Samples are read off the solver's own interpolant. It fails after `max_steps`, or as soon as it
-    is seen that it would take many more.
+    It fails after `max_steps`, or as soon as it is seen that it would take many more.
 
     Parameters
     ----------
     name : of the class in `scipy.integrate`, such as "DOP853".
     relative_tolerance, absolute_tolerance : of the local error; the absolute one in rad, rad/s.
     max_steps : in one segment of the loads.
+    ends_at_samples : whether a step ends at every sample, which is then as accurate as the steps;
+        else samples are read off the solver's own interpolant, which is less accurate.
     """
     import scipy.integrate
 
@@ -184,10 +190,19 @@ def scipy_integrator(
             return slope
 
         rows, steps, message, solver = [np.empty((0, len(state)))], 0, "", None
+        stops = times.tolist() if ends_at_samples else []
+        if not stops or stops[-1] < end:
+            stops.append(end)
+        stops.reverse()  # the next one is the last
         with np.errstate(all="ignore"), time_limit.samples_kept_at_limit():
             try:
                 solver = solver_type(
-                    watched, start, state, end, rtol=relative_tolerance, atol=absolute_tolerance
+                    watched,
+                    start,
+                    state,
+                    stops.pop(),
+                    rtol=relative_tolerance,
+                    atol=absolute_tolerance,
                 )
                 done = 0
                 while solver.status == "running":
@@ -199,8 +214,13 @@ def scipy_integrator(
                     steps += 1
                     reached = int(np.searchsorted(times, solver.t, side="right"))
                     if reached > done:
-                        rows.append(solver.dense_output()(times[done:reached]).T)
+                        if ends_at_samples:
+                            rows.append(solver.y[None, :])
+                        else:
+                            rows.append(solver.dense_output()(times[done:reached]).T)
                         done = reached
+                    if solver.status == "finished" and stops:  # with the step that it has found
+                        solver.t_bound, solver.status = stops.pop(), "running"
                     if solver.status == "running" and _is_too_long(
                         steps, max_steps, (solver.t - start) / (end - start)
                     ):

@@ -124,7 +124,7 @@ def build(scene: Scene, settings: Any) -> ReferenceSolver:
     settings : `ReferenceSettings`; their tolerances are those of the runs in quad precision.
     """
     if not is_available():
-        runs = _in_doubles(scene, _TIGHTEST), _in_doubles(scene, _LOOSER)
+        runs = _in_doubles(scene, _TIGHTEST, ends_at_samples=True), _in_doubles(scene, _LOOSER)
         return ReferenceSolver(scene, runs, _DOUBLE_EPSILON)
     best, check = _in_quad(scene, settings.tolerance), _in_quad(scene, settings.check_tolerance)
     return ReferenceSolver(scene, [best, check], _QUAD_EPSILON)
@@ -135,9 +135,14 @@ def _in_quad(scene: Scene, tolerance: float, times: Array | None = None) -> Prop
 
 
 def _in_doubles(
-    scene: Scene, tolerances: tuple[float, float], times: Array | None = None
+    scene: Scene,
+    tolerances: tuple[float, float],
+    times: Array | None = None,
+    *,
+    ends_at_samples: bool = False,
 ) -> OdeSolver:
-    return OdeSolver(scene, scipy_integrator("DOP853", *tolerances), times)
+    integrator = scipy_integrator("DOP853", *tolerances, ends_at_samples=ends_at_samples)
+    return OdeSolver(scene, integrator, times)
 
 
 def error_growth(scene: Scene) -> Array:
@@ -278,7 +283,7 @@ def reference_at(scene: Scene, times: Array) -> TimedReference:
     if is_available():
         run: Propagation | OdeSolver = _in_quad(scene, _QUAD_TOLERANCE, times)
     else:
-        run = _in_doubles(scene, _TIGHTEST, times)
+        run = _in_doubles(scene, _TIGHTEST, times, ends_at_samples=True)
     run.integrate()
     trajectory, matrices = run.observe(), _transition_matrices(scene, times)
     rows, moving, count = len(trajectory.time), scene.moving_coordinates, len(scene.initial_angles)
