@@ -188,7 +188,7 @@ class _Examination:
         self._bounds = bounds_of(method.name).with_entries(method.bounds)
         self._bound = defect_bound(self._bounds, method.name)
         self._made: list[Check] = []
-        self._refused: set[str] = set()
+        self._refused: dict[str, str] = {}  # scene -> reason
         # Whether the first scene that fails by its defects has faults at a time; None until then.
         self._has_faults_in_time: bool | None = None
 
@@ -215,7 +215,10 @@ class _Examination:
         for scene, allowance in scenes:
             self._scene(scene, allowance)
         able = [scene.name for scene, _ in scenes if scene.name not in self._refused]
-        self._add("builds", "all", float(not able), 0.0, "rejects every scene")
+        hint, reasons = "rejects every scene", set(self._refused.values())
+        if len(reasons) == 1:  # as that its engine is not installed
+            hint = f"{hint}: {reasons.pop()}"
+        self._add("builds", "all", float(not able), 0.0, hint)
         for name in EXACT:
             self._exact(
                 replace(only_scene(name), duration=1.0, samples=11, outputs=("angles", "rates"))
@@ -297,7 +300,7 @@ class _Examination:
                 scene, solution = without_loads, again
         if solution.status == REFUSED:
             reason = solution.message
-            self._refused.add(scene.name)
+            self._refused[scene.name] = reason
             self._add("refusal", scene.name, float(not reason), 0.0, reason or "without a reason")
             return
         fault = protocol_fault(solution)
