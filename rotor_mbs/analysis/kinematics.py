@@ -8,6 +8,7 @@ import numpy as np
 
 from rotor_mbs.scenario.scene import Blade, Scene
 from rotor_mbs.scenario.time_table import value_at, values_at
+from rotor_mbs.solution.defects import row_blocks
 from rotor_mbs.solution.trajectory import Array
 
 
@@ -19,10 +20,11 @@ def tip_paths(scene: Scene, angles: Array) -> Array:
     scene : tilt, cones and tips of its blades are used.
     angles : (n, 1 + blades) rad, rotor first.
     """
-    return np.stack(
-        [_rotated(_frames(scene, angles, i), blade.tip) for i, blade in enumerate(scene.blades)],
-        axis=1,
-    )
+    paths = np.empty((len(angles), len(scene.blades), 3))
+    for rows in row_blocks(len(angles)):
+        for i, blade in enumerate(scene.blades):
+            paths[rows, i] = _rotated(_frames(scene, angles[rows], i), blade.tip)
+    return paths
 
 
 def kinetic_energy(scene: Scene, angles: Array, rates: Array) -> Array:
@@ -35,6 +37,14 @@ def kinetic_energy(scene: Scene, angles: Array, rates: Array) -> Array:
     scene : masses, centres of mass and inertias of its blades are used.
     angles, rates : (n, 1 + blades) rad and rad/s, rotor first.
     """
+    energy = np.empty(len(angles))
+    for rows in row_blocks(len(angles)):
+        energy[rows] = _kinetic_energy(scene, angles[rows], rates[rows])
+    return energy
+
+
+def _kinetic_energy(scene: Scene, angles: Array, rates: Array) -> Array:
+    """Return `kinetic_energy` of all rows at once."""
     total = 0.5 * scene.hub_inertia * rates[:, 0] ** 2
     for i, blade in enumerate(scene.blades):
         frames = _frames(scene, angles, i)
@@ -67,6 +77,14 @@ def potential_energy(scene: Scene, time: Array, angles: Array) -> Array:
     time : (n,) s, for rest angles that change.
     angles : (n, 1 + blades) rad, rotor first.
     """
+    energy = np.empty(len(angles))
+    for rows in row_blocks(len(angles)):
+        energy[rows] = _potential_energy(scene, time[rows], angles[rows])
+    return energy
+
+
+def _potential_energy(scene: Scene, time: Array, angles: Array) -> Array:
+    """Return `potential_energy` of all rows at once."""
     total = np.zeros(len(angles))
     for i, blade in enumerate(scene.blades):
         total += (

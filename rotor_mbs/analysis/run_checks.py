@@ -20,7 +20,7 @@ from rotor_mbs.models.lagrange.samples import load_conditioning, load_rounding
 from rotor_mbs.models.lagrange.singularity import least_inertia_shares
 from rotor_mbs.scenario.accuracy_bounds import Bounds
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.defects import FLOOR_SAFETY, LEFT_ZERO, Defects
+from rotor_mbs.solution.defects import FLOOR_SAFETY, LEFT_ZERO, Defects, row_blocks
 from rotor_mbs.solution.metrics import Metrics, energy_scale
 from rotor_mbs.solution.quantities import (
     Array,
@@ -196,9 +196,11 @@ def _checks_of_outputs(run: RunSamples, bounds: Bounds) -> Iterator[Check]:
     if not scene.wants("angles"):
         return
     if trajectory.tip is not None:
-        away = np.linalg.norm(
-            trajectory.tip - kinematics.tip_paths(scene, trajectory.angles), axis=2
-        ).max()
+        largest = []
+        for rows in row_blocks(len(trajectory.time)):
+            paths = kinematics.tip_paths(scene, trajectory.angles[rows])
+            largest.append(np.linalg.norm(trajectory.tip[rows] - paths, axis=2).max())
+        away = np.max(largest)
         length = max(float(np.linalg.norm(blade.tip)) for blade in scene.blades) or 1.0
         hint = "the tip point, the azimuth or the rotation of a blade"
         fault = f"a tip is {away:.1e} m from where its angles put it, allowed {{bound}} m"

@@ -43,6 +43,10 @@ DRIFT_ROWS = 100
 # Intervals whose matrices are processed at once: all those of a run of a million samples would take
 # gigabytes.
 BLOCK_ROWS = 40 * DRIFT_ROWS
+# Up to so many intervals their matrices are kept, 51 MB with three blades. Those of longer runs are
+# computed again by each of the few loops that need them, which takes less than half as long as the
+# integration from row to row.
+KEPT_ROWS = 25 * BLOCK_ROWS
 
 
 @dataclass(frozen=True)
@@ -59,7 +63,7 @@ class Defects:
         fails.
     rate_units : (1 + blades,) rad/s, scale of the rates: a rate defect times the interval is an
         angle.
-    find_transitions : function that computes `transitions`.
+    find_transitions : function that computes those of `transitions` in a slice of the intervals.
     moving : coordinates with inertia.
     resting : pitches that stay at zero by symmetry, where the error is the state itself.
     states : (n, m) angles, then rates, of the moving coordinates of the run.
@@ -77,7 +81,7 @@ class Defects:
     angles: Array
     rates: Array
     rate_units: Array
-    find_transitions: Callable[[], Array]
+    find_transitions: Callable[[slice], Array]
     moving: tuple[int, ...]
     resting: tuple[int, ...]
     states: Array
@@ -95,7 +99,7 @@ class Defects:
         Angles come first, then rates. A matrix is infinite where the closed form does not reach the
         next row.
         """
-        return self.find_transitions()
+        return self.find_transitions(slice(0, len(self.angles)))
 
     @functools.cached_property
     def sizes(self) -> Array:
@@ -103,8 +107,13 @@ class Defects:
 
         It is that of the angles, and of the rates in `rate_units`.
         """
-        both = np.hstack([np.abs(self.angles), np.abs(self.rates) / self.rate_units])
-        return np.asarray(np.where(np.isfinite(both), both, np.inf).max(axis=1))
+        largest: Array = np.empty(len(self.angles))
+        for rows in row_blocks(len(largest)):
+            both = np.hstack(
+                [np.abs(self.angles[rows]), np.abs(self.rates[rows]) / self.rate_units]
+            )
+            largest[rows] = np.where(np.isfinite(both), both, np.inf).max(axis=1)
+        return largest
 
     @property
     def channel_sizes(self) -> Array:
@@ -112,8 +121,7 @@ class Defects:
 
         Angles come first, then rates; inf for NaN.
         """
-        sizes = np.abs(self._vectors) / self._units
-        return np.asarray(np.where(np.isfinite(sizes), sizes, np.inf))
+        return self._channel_sizes(slice(0, len(self.angles)))
 
     @property
     def floor(self) -> Array:
@@ -127,54 +135,40 @@ class Defects:
         They add up from the rounding of the row at the start, carried to the end; that of the row
         at the end; and that of the arithmetic in between, which grows as much as any other error.
         """
-        with np.errstate(all="ignore"):
-            carried = np.empty((len(self.angles), len(self.start)))
-            for rows in _blocks(len(carried)):
-                np.einsum(
-                    "kij,kj->ki",
-                    np.abs(self.transitions[rows]),
-                    self.rounding[rows],
-                    out=carried[rows],
-                )
-            floors = (carried + self.rounding[1:]) / self._units
-            floors += (self._arithmetic * np.maximum(self.growth, 1.0))[:, None]
-            return _with_small_numbers(floors)
+        return self._floors_and_growth[0]
 
-    @functools.cached_property
+    @property
     def growth(self) -> Array:
         """Return the error growth over each interval, (n - 1,).
 
         It is the largest entry of the transition matrix, with the rates in `rate_units`.
         """
-        growth: Array = np.empty(len(self.angles))
-        with np.errstate(all="ignore"):
-            for rows in _blocks(len(growth)):
-                growth[rows] = _largest_entry(self.transitions[rows], self._units)
-        return growth
+        return self._floors_and_growth[1]
 
-    @functools.cached_property
+    @property
     def channel_excess(self) -> Array:
         """Return the defects beyond rounding of the moving coordinates, (n - 1, m) rad.
 
         They are infinite where a defect is not finite.
         """
-        sizes = self.channel_sizes
-        with np.errstate(invalid="ignore"):
-            excess = np.maximum(sizes - FLOOR_SAFETY * self.floors, 0.0)
-        return np.asarray(np.where(np.isfinite(sizes), excess, np.inf))
+        return self._channel_excess(slice(0, len(self.angles)))
 
     @functools.cached_property
     def excess(self) -> Array:
         """Return the largest defect beyond rounding over all coordinates, (n - 1,) rad."""
         fixed = [i for i in range(self.angles.shape[1]) if i not in self.moving]
-        sizes = np.hstack(
-            [np.abs(self.angles[:, fixed]), np.abs(self.rates[:, fixed]) / self.rate_units[fixed]]
-        )
-        with np.errstate(invalid="ignore"):
-            of_fixed = np.where(
-                np.isfinite(sizes), sizes - FLOOR_SAFETY * self.floor[:, None], np.inf
-            )
-        return np.asarray(np.hstack([self.channel_excess, of_fixed]).max(axis=1, initial=0.0))
+        excess: Array = np.empty(len(self.angles))
+        for rows in row_blocks(len(excess)):
+            angles, rates = self.angles[rows, fixed], self.rates[rows, fixed]
+            sizes = np.hstack([np.abs(angles), np.abs(rates) / self.rate_units[fixed]])
+            floor = self.floors[rows].max(axis=1)
+            with np.errstate(invalid="ignore"):
+                of_fixed = np.where(
+                    np.isfinite(sizes), sizes - FLOOR_SAFETY * floor[:, None], np.inf
+                )
+            both = np.hstack([self._channel_excess(rows), of_fixed])
+            excess[rows] = both.max(axis=1, initial=0.0)
+        return excess
 
     @functools.cached_property
     def bound_factors(self) -> Array:
@@ -224,9 +218,8 @@ class Defects:
         The error of the initial state is included. It is valid for errors that are small compared
         with 1 rad.
         """
-        half = len(self.moving)
         angles = np.zeros((len(self.time), self.angles.shape[1]))
-        angles[:, list(self.moving)] = self._errors_and_drift[0][:, :half]
+        angles[:, list(self.moving)] = self._errors_and_drift[0]
         return angles
 
     @property
@@ -251,8 +244,9 @@ class Defects:
         growth = np.full(len(self.time), np.inf)
         whole = np.eye(len(rows))  # product of the matrices since the start
         growth[0] = 1.0
-        for block in _blocks(len(self.angles)):
-            scaled = self.transitions[block, rows[:, None], rows] * units / units[:, None]
+        for block in row_blocks(len(self.angles)):
+            matrices = self._transitions_in(block)
+            scaled = matrices[:, rows[:, None], rows] * units / units[:, None]
             with np.errstate(all="ignore"):
                 # First the products within all stretches at once, then from stretch to stretch.
                 products, _ = _carried(scaled, np.zeros((len(scaled), len(rows))), DRIFT_ROWS)
@@ -275,8 +269,12 @@ class Defects:
         finite = np.isfinite(self.sizes)
         if not finite.any():
             return float("nan")
-        both = np.hstack([self.angles, self.rates / self.rate_units])[finite]
-        return float(np.abs(both.mean(axis=0)).max())
+        total = np.zeros(2 * self.angles.shape[1])
+        for rows in row_blocks(len(finite)):
+            both = np.hstack([self.angles[rows], self.rates[rows] / self.rate_units])
+            # The sum so far is the first row: the order of the additions is that of the rows.
+            total = np.vstack([total, both[finite[rows]]]).sum(axis=0)
+        return float(np.abs(total / finite.sum()).max())
 
     def over_rows(self, rows: int) -> tuple[Array, Array]:
         """Return sums of the defects over a number of rows, and what rounding can cause of them.
@@ -301,7 +299,9 @@ class Defects:
                 stretches = slice(first, min(first + stretches_at_once, len(sums)))
                 inside = slice(first * rows, stretches.stop * rows)
                 ends = slice(inside.start + rows, inside.stop + 1, rows)
-                products, errors = _carried(self.transitions[inside], -self._vectors[inside], rows)
+                products, errors = _carried(
+                    self._transitions_in(inside), -self._vectors(inside), rows
+                )
                 sums[stretches] = np.abs(errors[:, -1]) / units
                 carried = np.einsum(
                     "kij,kj->ki", np.abs(products[:, -1]), self.rounding[inside][::rows]
@@ -324,11 +324,43 @@ class Defects:
         columns = list(self.moving)
         return np.concatenate([np.ones(len(columns)), self.rate_units[columns]])
 
+    def _transitions_in(self, rows: slice) -> Array:
+        """Return `transitions` in a slice of the intervals; they are kept up to `KEPT_ROWS`."""
+        if len(self.angles) <= KEPT_ROWS:
+            return self.transitions[rows]
+        return self.find_transitions(rows)
+
     @functools.cached_property
-    def _vectors(self) -> Array:
-        """Return the defects of the moving coordinates, (n - 1, m): angles, then rates."""
+    def _floors_and_growth(self) -> tuple[Array, Array]:
+        """Return `floors` and `growth`, by one loop over the transition matrices."""
+        floors, growth = np.empty((len(self.angles), len(self.start))), np.empty(len(self.angles))
+        for rows in row_blocks(len(growth)):
+            matrices = self._transitions_in(rows)
+            at_end = slice(rows.start + 1, rows.stop + 1)
+            with np.errstate(all="ignore"):
+                growth[rows] = _largest_entry(matrices, self._units)
+                carried = np.einsum("kij,kj->ki", np.abs(matrices), self.rounding[rows])
+                of_block = (carried + self.rounding[at_end]) / self._units
+                of_block += (self._arithmetic[rows] * np.maximum(growth[rows], 1.0))[:, None]
+                floors[rows] = _with_small_numbers(of_block)
+        return floors, growth
+
+    def _vectors(self, rows: slice) -> Array:
+        """Return the defects of the moving coordinates in a slice: angles, then rates, (k, m)."""
         columns = list(self.moving)
-        return np.hstack([self.angles[:, columns], self.rates[:, columns]])
+        return np.hstack([self.angles[rows, columns], self.rates[rows, columns]])
+
+    def _channel_sizes(self, rows: slice) -> Array:
+        """Return `channel_sizes` in a slice of the intervals, (k, m) rad."""
+        sizes = np.abs(self._vectors(rows)) / self._units
+        return np.asarray(np.where(np.isfinite(sizes), sizes, np.inf))
+
+    def _channel_excess(self, rows: slice) -> Array:
+        """Return `channel_excess` in a slice of the intervals, (k, m) rad."""
+        sizes = self._channel_sizes(rows)
+        with np.errstate(invalid="ignore"):
+            excess = np.maximum(sizes - FLOOR_SAFETY * self.floors[rows], 0.0)
+        return np.asarray(np.where(np.isfinite(sizes), excess, np.inf))
 
     @functools.cached_property
     def _arithmetic(self) -> Array:
@@ -337,26 +369,30 @@ class Defects:
         In every step it is of the size of its largest number, independent from step to step. A step
         is taken to span about a radian of the fastest coordinate.
         """
-        sizes = (np.abs(self.states) / self._units).max(axis=1)
-        fastest = np.abs(self.states[:, len(self.moving) :]).max(axis=1)
+        sizes, fastest = np.empty((2, len(self.states)))
+        for rows in row_blocks(len(self.states)):
+            magnitudes = np.abs(self.states[rows])
+            sizes[rows] = (magnitudes / self._units).max(axis=1)
+            fastest[rows] = magnitudes[:, len(self.moving) :].max(axis=1)
         largest, rate = (np.maximum(values[:-1], values[1:]) for values in (sizes, fastest))
         steps = np.maximum(rate * np.diff(self.time), 1.0)
         return np.asarray(self.precision * largest * self.conditioning * np.sqrt(steps))
 
     @functools.cached_property
     def _errors_and_drift(self) -> tuple[Array, float]:
-        """Return the errors of the states, (n, m), and the largest sum of defects.
+        """Return the errors of the moving angles, (n, m / 2), and the largest sum of defects.
 
-        The errors are those that the defects add up to; the sums are over `DRIFT_ROWS` rows, in
-        rad.
+        The errors are those that the defects add up to; the sums are over `DRIFT_ROWS` rows. Both
+        are in rad.
         """
         half = len(self.moving)
         resting = [i for i, coordinate in enumerate(self.moving) if coordinate in self.resting]
         at_zero = [*resting, *(half + i for i in resting)]
-        errors, drift = np.empty(self.states.shape), 0.0
-        errors[0] = self.states[0] - self.start
-        for block in _blocks(len(self.angles)):
-            matrices, offsets = self.transitions[block].copy(), -self._vectors[block]
+        angles, drift = np.empty((len(self.time), half)), 0.0
+        error = self.states[0] - self.start  # at the current row, of all variables
+        angles[0] = error[:half]
+        for block in row_blocks(len(self.angles)):
+            matrices, offsets = self._transitions_in(block).copy(), -self._vectors(block)
             # The error of a pitch that should be zero is known: it is the state itself.
             matrices[:, at_zero] = 0.0
             offsets[:, at_zero] = self.states[1:][block][:, at_zero]
@@ -367,13 +403,14 @@ class Defects:
                 # The sums within the stretches are known: only their starts follow each other.
                 for product, own in zip(products, sums, strict=True):
                     last = min(row + DRIFT_ROWS, block.stop)
-                    ends = product[1:] @ errors[row] + own[1:]
-                    errors[row + 1 : last + 1] = ends[: last - row]
+                    errors = product[1:] @ error + own[1:]
+                    angles[row + 1 : last + 1] = errors[: last - row, :half]
+                    error = errors[last - row - 1]
                     row = last
-        return errors, drift
+        return angles, drift
 
 
-def _blocks(count: int) -> Iterator[slice]:
+def row_blocks(count: int) -> Iterator[slice]:
     """Yield slices of at most `BLOCK_ROWS` of `count` rows.
 
     Each is a multiple of `DRIFT_ROWS`, except the last.

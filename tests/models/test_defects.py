@@ -440,16 +440,18 @@ def test_roundings_of_rows_in_between_and_of_their_times_cancel_in_a_sum() -> No
     assert np.median(floors) < 2.0 * np.median(defects.floors)
 
 
+@pytest.mark.parametrize("kept_rows", [1000, 0])
 def test_what_is_worked_on_block_by_block_is_as_of_all_at_once(
-    monkeypatch: pytest.MonkeyPatch,
+    monkeypatch: pytest.MonkeyPatch, kept_rows: int
 ) -> None:
     """A run of a million samples would take gigabytes; what is left over in the last block counts,
-    too."""
+    too. The matrices of a longer run are not kept, but computed again."""
     run = solve("lagrange/ode45", FIG11, {}).trajectory
     whole = defects_of(FIG11, run)
     monkeypatch.setattr(defects_module, "BLOCK_ROWS", 30)
     monkeypatch.setattr(solution_defects, "BLOCK_ROWS", 30)
     monkeypatch.setattr(solution_defects, "DRIFT_ROWS", 10)
+    monkeypatch.setattr(solution_defects, "KEPT_ROWS", kept_rows)
     parts = defects_of(FIG11, run)
     for name in ("transitions", "floors", "growth", "error_growth"):
         np.testing.assert_allclose(
@@ -460,6 +462,9 @@ def test_what_is_worked_on_block_by_block_is_as_of_all_at_once(
     for defects in (parts, whole):
         sums, _ = defects.over_rows(10)
         assert defects.drift >= sums.max() * (1.0 - 1e-9)
+    assert parts.mean == whole.mean
+    assert np.array_equal(parts.excess, whole.excess)
+    assert np.array_equal(parts.sizes, whole.sizes)
 
 
 # ---- Transition matrices

@@ -30,4 +30,4 @@ def made_defects(sizes: Sequence[float], **changes: Any) -> Defects:
         "own_loads": Trajectory(nothing[0], nothing, nothing),
     }
     transitions = changes.pop("transitions", np.tile(np.eye(2), (count, 1, 1)))
-    return Defects(find_transitions=lambda: transitions, **(fields | changes))
+    return Defects(find_transitions=lambda rows: transitions[rows], **(fields | changes))

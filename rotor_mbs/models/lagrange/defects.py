@@ -26,7 +26,7 @@ from rotor_mbs.models.lagrange.singularity import least_inertia_shares
 from rotor_mbs.models.lagrange.taylor import Propagation, is_compact
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import Segment, values_before
-from rotor_mbs.solution.defects import BLOCK_ROWS, Defects
+from rotor_mbs.solution.defects import BLOCK_ROWS, Defects, row_blocks
 from rotor_mbs.solution.metrics import ANGLE_LIMIT
 from rotor_mbs.solution.trajectory import Array, Trajectory
 
@@ -129,7 +129,7 @@ def interval_defects(
         angles=angle_defects,
         rates=rate_defects,
         rate_units=units,
-        find_transitions=functools.partial(_transitions, scene, time, states, ends),
+        find_transitions=functools.partial(_transitions_in, scene, time, states, ends),
         moving=tuple(moving),
         resting=resting_pitches(scene),
         states=states,
@@ -158,23 +158,21 @@ def rates_of_change(scene: Scene, time: Array, states: Array) -> Array:
         rad/s, then rad/s².
     """
     half = states.shape[1] // 2
-    angles, rates = list(states[:, :half].T), states[:, half:].T
     form, changes = rotor_form(scene), np.zeros(states.shape)
     changes[:, :half] = np.abs(states[:, half:])
-    sides = [loads_at(scene, time)]
-    if not scene.has_constant_loads:
-        sides.append(
-            load_values(
-                list(values_before(scene.load_segments, time)), scene.moving_coordinates[1:]
-            )
-        )
-    with np.errstate(all="ignore"):
-        for loads in sides:
-            accelerations = closed_form.accelerations(
-                angles, list(rates), form, loads, np.sin, np.cos
-            )
-            for i, values in enumerate(accelerations):
-                changes[:, half + i] = np.maximum(changes[:, half + i], np.abs(values))
+    for rows in row_blocks(len(time)):
+        angles, rates = list(states[rows, :half].T), list(states[rows, half:].T)
+        sides = [loads_at(scene, time[rows])]
+        if not scene.has_constant_loads:
+            before = values_before(scene.load_segments, time[rows])
+            sides.append(load_values(list(before), scene.moving_coordinates[1:]))
+        with np.errstate(all="ignore"):
+            for loads in sides:
+                accelerations = closed_form.accelerations(
+                    angles, rates, form, loads, np.sin, np.cos
+                )
+                for i, values in enumerate(accelerations):
+                    changes[rows, half + i] = np.maximum(changes[rows, half + i], np.abs(values))
     return changes
 
 
@@ -411,6 +409,18 @@ def _advance_by_dop853(scene: Scene) -> _Advance:
         return end_state, (part.evaluations or 0) // _EVALUATIONS_PER_STEP
 
     return advance
+
+
+def _transitions_in(scene: Scene, time: Array, states: Array, ends: Array, rows: slice) -> Array:
+    """Return the state transition matrices of a slice of the intervals, (k, m, m).
+
+    Parameters
+    ----------
+    scene, time, states, ends : as of `_transitions`.
+    rows : of the intervals; it begins and ends at whole numbers.
+    """
+    samples = slice(rows.start, rows.stop + 1)
+    return _transitions(scene, time[samples], states[samples], ends[rows])
 
 
 def _transitions(scene: Scene, time: Array, states: Array, ends: Array) -> Array:
