@@ -11,7 +11,7 @@ from pathlib import Path
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any, Protocol
 
-from rotor_mbs.errors import InputError
+from rotor_mbs.errors import InputError, RotorError, shown_value
 from rotor_mbs.methods.settings import Settings as Settings
 
 if TYPE_CHECKING:  # reading the catalogue needs none of them
@@ -129,6 +129,85 @@ class Solver(Protocol):
 
     def observe(self) -> Trajectory:
         """Return samples of the last integration, cut before the first row that is not finite."""
+
+
+def checked_result(value: Any, kind: type, name: str, function: object, method: str) -> Any:
+    """Return what a function of a method returned, if it is of the right type.
+
+    Parameters
+    ----------
+    value : what it returned.
+    kind : the type that it must have.
+    name : what the function is called in this package, such as "observe".
+    function : the function; a class stands for its `__init__`.
+    method : the method's name, in the message where the function's place is not known.
+
+    Raises
+    ------
+    RotorError
+        In one line, with the file and line number of the function.
+    """
+    if isinstance(value, kind):
+        return value
+    what = "None" if value is None else f"an object of type {type(value).__name__}"
+    allowed = f"an object of type {kind.__name__}"
+    raise RotorError(f"{place_of(function, method)}: {name} returned {what}; allowed: {allowed}")
+
+
+def place_of(function: object, default: str) -> str:
+    """Return "file:line" of a Python function or class, or a default for other callables."""
+    for place in (function, getattr(function, "__init__", None)):
+        code = getattr(place, "__code__", None)
+        if code is not None:
+            return f"{code.co_filename}:{code.co_firstlineno}"
+    return default
+
+
+def method_fault(method: Method) -> str:
+    """Return which attribute of a method has a wrong type, and what is allowed; "" where none."""
+    is_optional_number = method.order is None or _is_number(method.order)
+    are_right = {
+        "name": (isinstance(method.name, str), "text"),
+        "label": (isinstance(method.label, str), "text"),
+        "build": (callable(method.build), "a function of (scene, settings)"),
+        "items": (callable(method.items), "a function of (scene)"),
+        "settings": (_is_settings(method.settings), "a subclass of Settings"),
+        "order": (is_optional_number, "a number or None"),
+        "relative_cost": (_is_number(method.relative_cost), "a number"),
+        "ladders": (_are_all(method.ladders, Ladder), "a tuple of Ladder"),
+        "distributions": (_are_all(method.distributions, str), "a tuple of text"),
+        "arrays": (_are_all(method.arrays, str), "a tuple of text"),
+        "bounds": (_are_bounds(method.bounds), "a tuple of Bound"),
+        "solve_many": (_is_function_or_none(method.solve_many), "a function or None"),
+        "linearize": (_is_function_or_none(method.linearize), "a function or None"),
+        "import_engine": (callable(method.import_engine), "a function"),
+    }
+    for name, (is_right, allowed) in are_right.items():
+        if not is_right:
+            return f"{name} = {shown_value(getattr(method, name))}; allowed: {allowed}"
+    return ""
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _is_settings(value: object) -> bool:
+    return isinstance(value, type) and issubclass(value, Settings)
+
+
+def _is_function_or_none(value: object) -> bool:
+    return value is None or callable(value)
+
+
+def _are_all(values: object, kind: type) -> bool:
+    return isinstance(values, tuple | list) and all(isinstance(value, kind) for value in values)
+
+
+def _are_bounds(values: object) -> bool:
+    from rotor_mbs.scenario.accuracy_bounds import Bound  # late: `list` reads no bounds
+
+    return _are_all(values, Bound)
 
 
 def no_items(_scene: Scene) -> list[BuiltItem]:

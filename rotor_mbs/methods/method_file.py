@@ -21,7 +21,15 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from rotor_mbs.errors import InputError, RotorError, one_line, shown_value
-from rotor_mbs.methods.base import BuiltItem, Method, no_items, step_ladder, tolerance_ladder
+from rotor_mbs.methods.base import (
+    BuiltItem,
+    Method,
+    checked_result,
+    method_fault,
+    no_items,
+    step_ladder,
+    tolerance_ladder,
+)
 from rotor_mbs.processes.worker import TaskLostError, Worker, memory_limit_text
 
 if TYPE_CHECKING:
@@ -79,6 +87,8 @@ class MethodFile:
         for method in self.defined(module):
             if any(method is known for known in built_in):  # imported
                 continue
+            if fault := method_fault(method):
+                raise InputError(f"{self.path}: Method {shown_value(method.name)}: {fault}")
             own = self._named(method)
             if own.name in methods or not _NAME.fullmatch(own.name.rpartition("/")[2]):
                 raise InputError(
@@ -161,7 +171,11 @@ class MethodFile:
         """Return the items that a method builds, in this process; see `_items`."""
         with self.located():
             if method.items is not no_items:
-                return method.items(scene)
+                items = method.items(scene)
+                checked: list[BuiltItem] = checked_result(
+                    items, list, "items", method.items, method.name
+                )
+                return checked
             method.build(scene, method.settings())
             return []
 

@@ -9,11 +9,17 @@ from collections.abc import Mapping
 import numpy as np
 
 from rotor_mbs.errors import RotorError, system_errors_apart
-from rotor_mbs.methods.base import Method
+from rotor_mbs.methods.base import Method, Solver, checked_result, place_of
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.methods.time_limit import OutOfTimeError, caller_signals, time_limit
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.trajectory import Solution, shape_fault
+from rotor_mbs.solution.trajectory import (
+    Integration,
+    Solution,
+    Trajectory,
+    report_fault,
+    shape_fault,
+)
 
 _OBSERVING_S = 1.0  # in any case, of what was reached by the time limit
 
@@ -53,7 +59,7 @@ def solve(
     OutOfTimeError
         If the method cannot keep the samples that it had reached at the time limit.
     RotorError
-        If an array of the samples has a wrong shape.
+        If the method returns objects of other types, or arrays of a wrong shape.
     Exception
         One of SYSTEM_ERRORS if the system lacks something or a library cannot be loaded; whatever
         else the method raises.
@@ -62,7 +68,7 @@ def solve(
     chosen = method.chosen(scene, settings)
     with system_errors_apart(OutOfTimeError):
         start = time.perf_counter()
-        solver = method.build(scene, chosen)
+        solver = _built(method, method.build(scene, chosen))
         setup_s = time.perf_counter() - start
 
         run_times: list[float] = []
@@ -76,6 +82,7 @@ def solve(
                     start = time.perf_counter()
                     integration = solver.integrate()
                     run_times.append(time.perf_counter() - start)
+                    _check_report(method, solver, integration)
                     if integration.out_of_time:  # another would not be stopped
                         break
         finally:
@@ -87,6 +94,7 @@ def solve(
         # Samples of a motion that runs away overflow: the judgement sees what is not finite.
         with time_limit(remaining_s), np.errstate(over="ignore", invalid="ignore"):
             trajectory = solver.observe()
+        checked_result(trajectory, Trajectory, "observe", solver.observe, method.name)
         output_s = time.perf_counter() - start
     if fault := shape_fault(scene, trajectory):
         raise RotorError(f"{method.name}: {fault}")
@@ -100,6 +108,24 @@ def solve(
         run_times,
         output_s,
     )
+
+
+def _built(method: Method, solver: Solver) -> Solver:
+    """Return what a method built. Raises RotorError if it is no solver."""
+    missing = [name for name in ("integrate", "observe") if not hasattr(solver, name)]
+    if missing:
+        place = place_of(method.build, method.name)
+        what = "None" if solver is None else f"an object without {' and '.join(missing)}"
+        allowed = "an object with integrate and observe"
+        raise RotorError(f"{place}: build returned {what}; allowed: {allowed}")
+    return solver
+
+
+def _check_report(method: Method, solver: Solver, integration: Integration) -> None:
+    """Raise RotorError if what a solver reports of an integration is of a wrong type."""
+    checked_result(integration, Integration, "integrate", solver.integrate, method.name)
+    if fault := report_fault(integration):
+        raise RotorError(f"{place_of(solver.integrate, method.name)}: {fault}")
 
 
 def _has_time(run_times: list[float], repeats: int, budget_s: float) -> bool:

@@ -321,7 +321,7 @@ def _end_of(task: T, future: Future[R], pool: TaskPool) -> TaskEnd[T, R]:
         return TaskEnd(task, None, "worker_died", f"{what}: {text}", error)
     failure = pool.failure(error)
     if failure == "error":
-        return TaskEnd(task, None, failure, one_line(error), error)
+        return TaskEnd(task, None, failure, text, error)
     return TaskEnd(task, None, failure, str(error))
 
 

@@ -11,6 +11,7 @@ import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from html import escape
+from numbers import Integral, Real
 from typing import Any
 
 import numpy as np
@@ -87,10 +88,17 @@ class Trajectory:
 
 
 def shape_fault(scene: Scene, run: Trajectory) -> str:
-    """Return what is wrong with the shapes of a run's arrays; "" where all are right.
+    """Return what is wrong with the types and shapes of a run's arrays; "" where all are right.
 
-    Each array must have the shape of the scene, with a row for each time.
+    Each array must have real numbers, in the shape of the scene, with a row for each time.
     """
+    for name in ("time", *(quantity.name for quantity in known_quantities(scene.outputs))):
+        values = run.get(name)
+        if values is None and name not in ("time", "angles", "rates"):
+            continue
+        if not isinstance(values, np.ndarray) or values.dtype.kind not in "fiu":
+            of = f" of {values.dtype}" if isinstance(values, np.ndarray) else ""
+            return f"{name} is {type(values).__name__}{of}; allowed: an array of real numbers"
     time = np.shape(run.time)
     if len(time) != 1:
         return f"time has the shape {time}; allowed: one dimension"
@@ -123,6 +131,23 @@ class Integration:
     steps: int | None = None
     rhs_evaluations: int | None = None
     out_of_time: bool = False
+
+
+def report_fault(report: Integration) -> str:
+    """Return which field of a report has a wrong type, and what is allowed; "" where none."""
+    kinds: dict[str, tuple[Any, str]] = {
+        "success": (bool | np.bool_, "True or False"),
+        "message": (str, "text"),
+        "time_reached": (Real, "a number"),
+        "steps": (Integral | None, "a whole number or None"),
+        "rhs_evaluations": (Integral | None, "a whole number or None"),
+        "out_of_time": (bool | np.bool_, "True or False"),
+    }
+    for name, (kind, allowed) in kinds.items():
+        value = getattr(report, name)
+        if not isinstance(value, kind):
+            return f"Integration: {name} = {shown_value(value)}; allowed: {allowed}"
+    return ""
 
 
 @dataclass

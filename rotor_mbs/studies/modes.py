@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from rotor_mbs.analysis import modes as modal
 from rotor_mbs.errors import InputError, MethodRefusal, RotorError, shown_value
+from rotor_mbs.methods.base import checked_result
 from rotor_mbs.methods.catalogue import find_method, methods, with_method_files
 from rotor_mbs.methods.time_limit import caller_signals
 from rotor_mbs.processes.pool import local_pool, run_in
@@ -30,7 +31,7 @@ from rotor_mbs.scenario.keys import LARGEST, SMALLEST
 from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.scenario.time_table import value_at
 from rotor_mbs.solution.status import REFUSED
-from rotor_mbs.solution.trajectory import Array
+from rotor_mbs.solution.trajectory import Array, Linearization
 
 if TYPE_CHECKING:
     from rotor_mbs.models.lagrange.floquet import Turn
@@ -246,7 +247,9 @@ def _linear(
             made = []
             for point, weight in zip(steady, weight_stiffnesses, strict=True):
                 assert method.linearize is not None
-                made.append(method.linearize(*point))
+                linear = method.linearize(*point)
+                checked_result(linear, Linearization, "linearize", method.linearize, method.name)
+                made.append(linear)
                 left = np.abs(made[-1].residual).max(initial=0.0)
                 if left > _STEADY * max(np.abs(made[-1].stiffness).max(), weight, 1e-12):
                     moves = f"accelerates by {left:.1e} rad/s^2 where the closed form is steady"

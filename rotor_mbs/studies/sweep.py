@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from rotor_mbs.analysis.judgement import clearly_ok, defects_of, judge
 from rotor_mbs.errors import InputError, MethodRefusal
+from rotor_mbs.methods.base import checked_result
 from rotor_mbs.methods.catalogue import (
     Refusal,
     check_names,
@@ -51,7 +52,7 @@ from rotor_mbs.solution.metrics import (
 )
 from rotor_mbs.solution.quantities import energy_balance, quantities
 from rotor_mbs.solution.status import REFUSED, STATUSES, code_of
-from rotor_mbs.solution.trajectory import Array, Solution, Trajectory
+from rotor_mbs.solution.trajectory import Array, RunBlock, Solution, Trajectory
 
 # outputs that every `Method.solve_many` computes
 _SIDE_BY_SIDE = ("", "angles", "rates", "tip", "energy")
@@ -220,6 +221,7 @@ def _side_by_side(chunk: Chunk, scenes: Sequence[Scene]) -> Rows:
     assert method.solve_many is not None
     settings = method.settings.of(chunk.method, chunk.settings)
     block = method.solve_many(scenes, settings)
+    checked_result(block, RunBlock, "solve_many", method.solve_many, method.name)
     found = block.quantities
     kinetic, work = found["kinetic_energy"], found["work"]  # which a sweep's scenes ask for
     errors = energy_balance(kinetic, found["potential_energy"], work)
