@@ -7,9 +7,11 @@ the folder that the environment variable ROTOR_MBS_REPORT names.
 
 from __future__ import annotations
 
+import base64
 import json
 import math
 import os
+import re
 import shutil
 import subprocess
 import tarfile
@@ -409,6 +411,22 @@ def test_without_scripts_the_answer_the_tables_and_the_main_plots_are_there(
     assert page.run(empty) == 0
     assert page.run("document.documentElement.scrollWidth") <= 390
     assert page.run("document.querySelector('.viewer')?.offsetHeight ?? 0") == 0
+
+
+def test_a_printed_page_has_few_sheets_and_no_heading_without_contents(
+    page: Page, report: Path
+) -> None:
+    headings = (
+        "[...document.querySelectorAll('section')].filter(s => s.offsetHeight).map(s => "
+        "s.innerText.trim().split('\\n').length)"
+    )
+    for name, sheets in (("index.html", 5), ("own.html", 7), ("figures.html", 10)):
+        page.open(report / name, 1440)
+        page.call("Emulation.setEmulatedMedia", media="print")
+        assert min(page.run(headings)) > 1, name
+        page.call("Emulation.setEmulatedMedia", media="")
+        printed = base64.b64decode(page.call("Page.printToPDF")["data"])
+        assert len(re.findall(rb"/Type\s*/Page\b", printed)) <= sheets, name
 
 
 def test_in_print_the_plots_stand_and_the_viewer_does_not(page: Page, report: Path) -> None:

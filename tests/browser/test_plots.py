@@ -63,6 +63,14 @@ PLOTS = {
     "short": plot("short", curve(TIME[:51])),
     "log": plot("log", curve(np.where(TIME > 0.0, 10.0 ** (TIME - 8.0), 0.0)), log=True),
     "clip": plot("clip", curve(np.sin(TIME)), curve(-np.exp(TIME), "two", TWO), clip=(-3.0, 3.0)),
+    "two clips": plot(
+        "two clips",
+        curve(np.sin(TIME), "right"),
+        curve(-np.exp(TIME)),
+        curve(-1.1 * np.exp(TIME), "two", TWO),
+        clip=(-3.0, 3.0),
+    ),
+    "near": plot("near", curve(0.314161 + 1e-7 * TIME)),
     "far": plot("far", curve(1e6 + TIME)),
     "sides": plot("sides", curve(np.linspace(-420.0, 380.0, 101))),
     "small": plot("small", curve(1.5e-4 * TIME)),
@@ -399,6 +407,41 @@ def test_in_print_plots_are_there_and_buttons_are_not(page: Page, written: Path)
     page.call("Emulation.setEmulatedMedia", media="")
     assert height > 50.0
     assert full == "none"
+
+
+def test_printed_plots_have_one_size_of_text_whatever_the_window_was(
+    page: Page, written: Path
+) -> None:
+    """They are drawn for the columns of a printed page, and anew for the window afterwards."""
+    width = f"Number({find('lines')}.querySelector('svg').getAttribute('viewBox').split(' ')[2])"
+    printed = set()
+    for window in (390, 1440):
+        opened(page, written, window)
+        before = page.run(width)
+        page.run("window.dispatchEvent(new Event('beforeprint'))")
+        printed.add(page.run(width))
+        page.run("window.dispatchEvent(new Event('afterprint'))")
+        assert page.run(width) == before
+    # 182 mm of A4 hold two columns: text of 12 px must not be smaller than 6 pt, 8 px.
+    (drawn,) = printed
+    assert 12.0 * (182.0 / 25.4 * 96.0 / 2.0) / drawn > 8.0
+
+
+def test_texts_of_curves_that_leave_do_not_cover_each_other(page: Page, written: Path) -> None:
+    opened(page, written)
+    boxes = page.run(
+        f"[...{find('two clips')}.querySelectorAll('text.quiet')].map(t => t.getBoundingClientRect())"
+        ".map(r => [r.left, r.right, r.top, r.bottom])"
+    )
+    assert len(boxes) == 2
+    (left, right, top, bottom), (other_left, other_right, other_top, other_bottom) = boxes
+    assert right <= other_left or other_right <= left or bottom <= other_top or other_bottom <= top
+
+
+def test_neighbours_on_an_axis_have_different_numbers(page: Page, written: Path) -> None:
+    opened(page, written)
+    texts = page.run(LABELS.format(find=find("near")))
+    assert len(texts) == len(set(texts)) >= 2
 
 
 def test_a_click_on_a_heading_sorts_by_number(page: Page, written: Path) -> None:

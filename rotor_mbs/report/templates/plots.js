@@ -10,10 +10,12 @@
   const DRAG = 6;                          // px: a shorter way of the pointer is a click
   const DENSE = 4;                         // samples a pixel, beyond which smallest and largest are drawn
   const FAR = 1e4;                         // px: curves do not go farther beyond the edge
+  const PRINTED = 860;                     // px: a printed page has the plots of a screen of this width, scaled
   const TIME = "time";
   const zooms = {};                        // by the name of the horizontal axis: what is shown of it
   const hidden = new Set();                // groups and keys of the curves that are switched off
   const plots = [];
+  let isPrinting = false;
   let run = 0;                             // of a table of runs, the row that is shown
 
   // ---- Numbers as text
@@ -186,8 +188,14 @@
       return { path, outside };
     };
 
-    const redraw = () => {
-      width = Math.max(box.clientWidth, 200);
+    // On paper as many plots stand side by side as the style sheet says, however wide the window is.
+    const printedWidth = () => {
+      const grid = box.closest("[class^=grid]"), columns = Number(grid?.className.slice(4) ?? 1);
+      return PRINTED / columns - 40;
+    };
+
+    const redraw = (wanted = box.clientWidth) => {
+      width = Math.max(wanted, 200);
       const [from, to] = extent();
       shown = plot.curves.filter((curve) => !hidden.has(`${group} ${curve.key}`));
       shown = shown.map((curve) => ({ ...curve, xs: column(curve.x), ys: column(curve.y) }));
@@ -216,16 +224,16 @@
         const d = x === undefined ? `M${left} ${sy.at(y)}H${right}` : `M${sx.at(x)} ${TOP}V${bottom}`;
         draw(area, "path", { class: "mark", d });
       });
+      const top = [], foot = [];  // of the texts at the upper and at the lower edge, the ends of each
       shown.forEach((curve) => {
         const { path, outside } = trace(curve, from, to, limits);
         const only = curve.dots === "only" ? " only" : "";
         draw(area, "path", { class: `curve ${curve.style}${only}`, d: path });
         if (curve.dots) point(area, curve, from, to);
-        if (outside >= 0 && !plot.log) leave(area, curve, outside, limits);
+        if (outside >= 0 && !plot.log) leave(area, curve, outside, limits, top, foot);
       });
       label(area, shown.filter(({ beside }) => beside), from, to, limits);
-      const taken = [];  // of each line of texts, where the last one ends
-      marks.filter((mark) => mark.text).forEach((mark) => describe(area, mark, right, taken));
+      marks.filter((mark) => mark.text).forEach((mark) => describe(area, mark, right, top));
       draw(svg, "path", { class: "axis", d: `M${left} ${TOP}V${bottom}H${right}` });
       cursor = draw(svg, "g", { class: "cursor" });
       read(here, false);
@@ -257,14 +265,24 @@
       });
     };
 
+    // The first line of an edge where a text covers no other one.
+    const freeLine = (taken, from, to) => {
+      let line = 0;
+      while (taken.some((other) => other.line === line && other.from < to && from < other.to)) line++;
+      taken.push({ line, from, to });
+      return line;
+    };
+
     // A curve that leaves the range says how far it goes.
-    const leave = (area, { xs, ys, name }, first, [, high]) => {
+    const leave = (area, { xs, ys, name }, first, [, high], top, foot) => {
       const isAbove = ys[first] > high, known = Array.from(ys).filter(Number.isFinite);
       const end = known.reduce((one, other) => (isAbove ? Math.max(one, other) : Math.min(one, other)));
       const content = `${isAbove ? "▲" : "▼"} ${name}: to ${text(end, 3)}`;
       const last = width - RIGHT - LETTER * content.length;
       const x = Math.max(Math.min(sx.at(xs[first]) + 6, last), left + 6);
-      draw(area, "text", { class: "quiet", x, y: isAbove ? TOP + 12 : bottom - 6 }, content);
+      const line = freeLine(isAbove ? top : foot, x, x + LETTER * content.length);
+      const y = isAbove ? TOP + 12 + 14 * line : bottom - 6 - 14 * line;
+      draw(area, "text", { class: "quiet", x, y }, content);
     };
 
     // The text of a mark; vertical ones in a line of their own where the text before would be covered.
@@ -275,9 +293,7 @@
       }
       const length = LETTER * content.length, isLeft = sx.at(x) + length > right;
       const from = isLeft ? sx.at(x) - length : sx.at(x);
-      let line = 0;
-      while (taken[line] > from) line++;
-      taken[line] = from + length;
+      const line = freeLine(taken, from, from + length);
       const place = { x: sx.at(x) + (isLeft ? -5 : 5), y: TOP + 12 + 14 * line, "text-anchor": isLeft ? "end" : "start" };
       draw(area, "text", { class: "quiet", ...place }, content);
     };
@@ -397,11 +413,11 @@
       keys[event.key]();
       event.preventDefault();
     });
-    plots.push({ axis, box, redraw, read });
+    plots.push({ axis, box, redraw, read, printedWidth });
     redraw();
     // Text stays 12 px high at every width: the drawing is made anew, not scaled.
     new ResizeObserver(() => {
-      if (box.clientWidth && Math.max(box.clientWidth, 200) !== width) redraw();
+      if (!isPrinting && box.clientWidth && Math.max(box.clientWidth, 200) !== width) redraw();
     }).observe(box);
   };
 
@@ -418,6 +434,12 @@
   });
   document.documentElement.classList.add("live");
   document.querySelectorAll(".plot").forEach(start);
+  const print = (isOn) => {
+    isPrinting = isOn;
+    plots.forEach((plot) => plot.redraw(isOn ? plot.printedWidth() : undefined));
+  };
+  window.addEventListener("beforeprint", () => print(true));
+  window.addEventListener("afterprint", () => print(false));
   // The clock of the viewer, and the run that a map shows.
   document.addEventListener("viewer-time", (event) => {
     plots.filter(({ axis }) => axis.name === TIME).forEach((plot) => plot.read(event.detail, false));
