@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 from support.commands import refusal, rotor_mbs
-from support.report_pages import plots_of, section_of, text_of
+from support.report_pages import answer_of, plots_of, section_of, text_of
 from support.scenes import paper
 from support.stored import Made, rotor, store
 
@@ -71,9 +71,12 @@ def test_a_figure_has_its_models_its_scenes_and_the_published_number(report: Pat
     section = section_of(text_of(report, "figures.html"), "figure-11")
     # position and velocity, as printed and corrected
     assert section.count('<figure class="plot"') == 4
-    assert "As printed: as printed, ode45; Corrected model: reference, quad precision" in section
+    # What holds of all figures is said once.
+    methods = "As printed: ode45; Corrected model: reference, quad precision."
+    assert methods in answer_of(text_of(report, "figures.html"))
+    assert text_of(report, "figures.html").count("quad precision") == 1
     assert ">2.7315<" in section
-    assert "initial state pi/6, pi/4, pi/6, pi/2 rad and pi/10, 0, 0, 0 rad/s" in section
+    assert "initial state π/6, π/4, π/6, π/2 rad and π/10, 0, 0, 0 rad/s" in section
     # Fig. 13a is the same run; 13b is not in the file.
     paths = section_of(text_of(report, "figures.html"), "figure-13")
     assert ("(a) As printed" in paths, "(b) As printed" in paths) == (True, False)

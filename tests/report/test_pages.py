@@ -351,6 +351,7 @@ def test_the_page_of_errata_has_each_with_its_matrices(report: Path) -> None:
     text = text_of(report, "errata.html")
     assert sections_of(text)[:3] == ["E1", "E2", "E3"]
     assert section_of(text, "E1").count('<td class="fault">') == 2
+    assert text.count("wrong entries are struck out") == 1
     assert answer_of(text).startswith("The printed equations contain three errors.")
 
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
-from markupsafe import Markup
+from markupsafe import Markup, escape
 
 from rotor_mbs.report.elements import (
     Curve,
@@ -31,7 +32,7 @@ from rotor_mbs.report.figures import (
     panel_runs,
 )
 from rotor_mbs.report.looks import Look, coordinate_look, label_of, step_look
-from rotor_mbs.report.numbers import in_words, typeset_title
+from rotor_mbs.report.numbers import in_words, minus, typeset_title
 from rotor_mbs.report.pages import Report, paper
 from rotor_mbs.report.pages.scene_plots import parting, range_of, whole_time
 from rotor_mbs.runs.read import StoredRun
@@ -67,6 +68,9 @@ def figures_page(report: Report) -> PageContent:
         pictures = panel_runs(figure, report.scenes)
         if pictures:
             sections.append(_figure_section(figure, pictures, report))
+    methods = {section.say for section in sections}
+    if len(methods) == 1:  # said once, at the top
+        sections = [replace(section, say="") for section in sections]
     departing = []
     for figure in available(report.scenes):
         for _, name in figure.panels:
@@ -88,6 +92,8 @@ def figures_page(report: Report) -> PageContent:
             in_words(len(sections))
         )
     )
+    if len(methods) == 1:
+        answer.append(escape(methods.pop()))
     sections.append(
         Section(
             "files",
@@ -125,7 +131,9 @@ def _figure_section(
     for letter, name in figure.panels:
         stored = report.scenes[name]
         initial = tomllib.loads(stored.scene.text)["initial"]  # pi/6 as it is written
-        angles, rates = (", ".join(map(str, initial[key])) for key in ("angles", "rates"))
+        angles, rates = (
+            ", ".join(_as_written(value) for value in initial[key]) for key in ("angles", "rates")
+        )
         before = f"({letter}) " if letter else ""
         text = Markup('{}{}; initial state {} rad and {} rad/s: <a href="{}">{}</a>')
         elements.append(
@@ -142,13 +150,24 @@ def _figure_section(
         for row in pictures.values()
         for key, runs in row.items()
     }
-    say = "; ".join(f"{HEADINGS[key]}: {methods[key]}" for key in SIDES if key in methods)
+    # "As printed: ode45", not "As printed: as printed, ode45".
+    lines = [
+        f"{HEADINGS[key]}: {methods[key].removeprefix(f'{HEADINGS[key].lower()}, ')}"
+        for key in SIDES
+        if key in methods
+    ]
+    say = "; ".join(lines)
     return Section(
         f"figure-{figure.number}",
         f"Figure {figure.number}: {_KINDS[figure.kind]}",
         elements,
         f"{say}.",
     )
+
+
+def _as_written(value: float | str) -> str:
+    """Return an initial value of a scene file as it is typeset: "11π/12" for "11*pi/12"."""
+    return minus(str(value).replace("*pi", "π").replace("pi", "π"))
 
 
 def _motion_plots(

@@ -270,6 +270,7 @@ def errata_page(report: Report) -> PageContent:
         effect = _effect(report, erratum.id)
         facts.append(Fact(f"{erratum.id}: {', '.join(erratum.stands_in)}", *effect))
     sections = []
+    say = "In matrices wrong entries are struck out and followed by the correct ones."
     for erratum in report.errata:
         items = [
             ("Where", formula(f"{erratum.entry} (pages {erratum.pages})", in_prose=True)),
@@ -287,16 +288,14 @@ def errata_page(report: Report) -> PageContent:
             items.append(("Equations affected", Markup("{}").format(", ".join(erratum.reaches))))
         elements: list[Element] = [Listing(items)]
         for equation, rows in matrices(entries, erratum.stands_in):
-            text = (
-                f"{equation} as printed; wrong entries are struck out and followed by the correct "
-                "ones"
-            )
-            elements.append(Matrix(text, rows))
+            elements.append(Matrix(f"{equation} as printed", rows))
+        heading = f"{erratum.id}: {', '.join(erratum.stands_in)}"
+        has_matrices = len(elements) > 1
         sections.append(
-            Section(
-                erratum.id, f"{erratum.id}: {', '.join(erratum.stands_in)}", [Grid(1, [elements])]
-            )
+            Section(erratum.id, heading, [Grid(1, [elements])], say if has_matrices else "")
         )
+        if has_matrices:
+            say = ""  # it stands above the first matrices alone
     head = ("Equation", "Entry", "Printed", "Correct", "Difference", "Explained by")
     rows_of_entries: list[Row] = []
     for entry in differing:
