@@ -58,7 +58,7 @@ _NO_ENGINE = (
 )  # versions that are not those of an engine
 _FRONT = Look(PALETTE["ring"][0], "-", "", "best of all methods")
 _LOWEST_ERROR = 1e-16  # rad: smaller ones are drawn there
-_METHODS_IN_A_TABLE = 7  # beside the scene
+_SCENES_IN_A_TABLE = 6  # beside the method
 
 
 def bench_page(results: OpenResults) -> PageContent:
@@ -167,13 +167,15 @@ def _facts(scenes: Mapping[str, Sequence[Record]]) -> list[Fact]:
     measured = sum(status != "left_out" for curve in curves for status in curve.statuses)
     count = sum(len(curve.statuses) for curve in curves)
     failed = sum(int(work_precision.failed(curve).sum()) for curve in curves)
-    methods = len({curve.method for curve in curves})
+    methods, variants = (
+        len({getattr(curve, key) for curve in curves}) for key in ("method", "name")
+    )
     return [
         Fact("Scenes", str(len(scenes))),
         Fact(
             "Methods",
             str(methods),
-            f"{len({curve.name for curve in curves})} with their variants",
+            "" if variants == methods else f"{variants} with their variants",
         ),
         Fact(
             "Settings that were timed",
@@ -341,45 +343,54 @@ def _reach_table(curves: Sequence[Record]) -> PageTable:
 def _reach_section(scenes: Mapping[str, Sequence[Record]]) -> Section:
     """Return which method reaches 1e-6 rad on which scene, and how much slower than the fastest.
 
+    Methods are rows and scenes columns, in as many tables as fit a page.
+
     Parameters
     ----------
     scenes : the curves of the bench, by scene.
     """
-    target = 1e-6
     methods = list(dict.fromkeys(curve.method for curves in scenes.values() for curve in curves))
+    ranked = {scene: work_precision.fastest(curves, 1e-6) for scene, curves in scenes.items()}
+    names = list(scenes)
     tables = []
-    for first in range(0, len(methods), _METHODS_IN_A_TABLE):
-        shown = methods[first : first + _METHODS_IN_A_TABLE]
+    for first in range(0, len(names), _SCENES_IN_A_TABLE):
+        shown = names[first : first + _SCENES_IN_A_TABLE]
         rows: list[Row] = []
-        for scene, curves in scenes.items():
-            ranked = work_precision.fastest(curves, target)
-            row: list[TableCell | str] = [scene]
-            for method in shown:
-                own = [curve for curve in curves if curve.method == method]
-                reach = next((reach for curve, reach in ranked if curve.method == method), None)
-                if reach is not None:
-                    row.append(
-                        TableCell(
-                            f"✓ × {number(reach.ratio)}",
-                            note=with_unit(reach.seconds, "s"),
-                            order=reach.ratio,
-                        )
-                    )
-                elif not own:
-                    row.append("")
-                elif any(work_precision.left_out(curve) for curve in own):
-                    row.append(TableCell("not measured"))
-                else:
-                    row.append(TableCell("✗ not reached", "bad"))
-            rows.append(row)
-        tables.append(
-            PageTable("Time to 1e-6 rad", ("Scene", *(label_of(method) for method in shown)), rows)
-        )
+        for method in methods:
+            cells = [_scene_cell(method, scenes[scene], ranked[scene]) for scene in shown]
+            rows.append([method_cell(method), *cells])
+        tables.append(PageTable("Time to 1e-6 rad", ("Method", *shown), rows))
     say = (
         "✓: reaches 10⁻⁶ rad, with its run time relative to the fastest there. Not measured: finer "
         "settings did not fit the time budget."
     )
     return Section("reach", "Scenes and methods", tables, say)
+
+
+def _scene_cell(
+    method: str,
+    curves: Sequence[Record],
+    ranked: Sequence[tuple[Record, work_precision.Reach]],
+) -> TableCell | str:
+    """Return whether a method reaches an error on a scene, as a cell; "" for one not tried there.
+
+    Parameters
+    ----------
+    method : the method.
+    curves : of the scene, by all methods.
+    ranked : the curves that reach the error, the fastest first; see `work_precision.fastest`.
+    """
+    own = [curve for curve in curves if curve.method == method]
+    reach = next((reach for curve, reach in ranked if curve.method == method), None)
+    if reach is not None:
+        return TableCell(
+            f"✓ × {number(reach.ratio)}", note=with_unit(reach.seconds, "s"), order=reach.ratio
+        )
+    if not own:
+        return ""
+    if any(work_precision.left_out(curve) for curve in own):
+        return "not measured"
+    return TableCell("✗ not reached", "bad")
 
 
 def _methods_section(results: OpenResults, scenes: Mapping[str, Sequence[Record]]) -> Section:
