@@ -374,8 +374,11 @@ def sweep_answer(sweep: _Sweep, quantities: Sequence[RunQuantity]) -> list[Marku
                 sweep.described(low),
             )
         else:
-            ends = (number(float(values[run]), 3) for run in (low, high))
-            text = Markup("{} stays between <b>{} and {}{}</b>").format(name, *ends, unit)
+            ends = [number(float(values[run]), 3) for run in (low, high)]
+            if ends[0] == ends[1]:
+                text = Markup("{} is <b>{}{}</b> in all of them").format(name, ends[0], unit)
+            else:
+                text = Markup("{} stays between <b>{} and {}{}</b>").format(name, *ends, unit)
         sentences.append(text + _deciding(sweep, values) + ".")
     return sentences
 
@@ -430,11 +433,9 @@ def _facts(sweep: _Sweep, quantities: Sequence[RunQuantity]) -> list[Fact]:
         facts.append(Fact(with_capital(field_name(key)), shown, note))
     for quantity in quantities[: 4 - len(facts)]:
         known = quantity.values[np.isfinite(quantity.values)]
-        ends = (
-            f"{number(float(known.min()))} to "
-            f"{number(float(known.max()))}{_unit_after(quantity.unit)}"
-        )
-        facts.append(Fact(with_capital(quantity.name), ends))
+        digits = 2 if is_wide(known) else 3  # those of the sentence
+        ends = text_range(*(number(float(end), digits) for end in (known.min(), known.max())))
+        facts.append(Fact(with_capital(quantity.name), f"{ends}{_unit_after(quantity.unit)}"))
     return facts
 
 
@@ -744,8 +745,14 @@ def _parameter_plot(
         curves = kept
     unit = sweep.unit(key)
     low, high = float(shown.min()), float(shown.max())
-    room = 0.02 * (high - low) if any(curve.dots for curve in curves) and not is_log else 0.0
-    axis = Horizontal(field_name(key), unit, field_name(key), low - room, high + room, is_log)
+    # Room for the halves of the first and of the last dot.
+    if is_log:
+        room = (high / low) ** 0.02
+        low, high = low / room, high * room
+    elif any(curve.dots for curve in curves):
+        room = 0.02 * (high - low)
+        low, high = low - room, high + room
+    axis = Horizontal(field_name(key), unit, field_name(key), low, high, is_log)
     return Plot(
         with_capital(quantity.name),
         quantity.unit,
