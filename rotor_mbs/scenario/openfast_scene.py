@@ -210,7 +210,10 @@ def _bearing_lines(rotor: OpenFastRotor) -> list[str]:
         ]
         comments = _comment(
             "The model prescribes the pitch. This spring keeps it: it is assumed, a pitch inertia "
-            f"at {HOLDING_FREQUENCY:g} Hz with {HOLDING_DAMPING:g} of critical damping."
+            f"at {HOLDING_FREQUENCY:g} Hz with {HOLDING_DAMPING:g} of critical damping. It starts "
+            "without load and takes up the blade's weight within a period, "
+            f"{1.0 / HOLDING_FREQUENCY:g} s: loads and pitch rates of that time are not the "
+            "model's."
         )
     return [
         "[bearing]",
