@@ -7,8 +7,9 @@ the simplest that fits is taken.
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -32,6 +33,7 @@ _FACTORS = {
     ),
 }
 LATE_OR_EARLY = (" late", " early")
+HELD = "every number is held"
 _MAX_ROWS_LATE = 3
 _MEANS_OF_ROWS = range(2, 22)
 _FINE_ROWS = 100  # intervals in which means over an interval are computed
@@ -39,8 +41,10 @@ _SAMPLES = 20  # of an interval, for such means
 _MEANS_OF_SAMPLES = (2, 4, 5, 10, 20)
 _FAR_LESS = 0.02  # of what is left by a column in which nothing is wrong
 _MIN_COMPARED = 10  # rows: with fewer, some mean always fits
+_MIN_LIMITED = 3  # intervals in which a limited column does not change
 _MIN_STEPS = 10  # distinct numbers: fewer do not show a step
 _MAX_STEPS = 1 << 20  # in the range of a column: with more, steps are not coarse
+_MAX_DIVISIONS = 12  # of Euclid's algorithm
 _WHOLE = 1e-3  # of a step: a number of steps this near to a whole one is taken as whole
 _TRUNCATED = (("rounded", 0.5), ("cut off", 1.0))  # the error of a step, in steps
 
@@ -116,14 +120,38 @@ class ColumnReadings:
         if right.left <= self._tolerance:
             return right
         enough = min(self.allowed, _FAR_LESS * right.left)
-        for kind in (self._units, self._late_rows, self._steps, self._differences, self._means):
-            readings = list(kind(j))
-            least = min((reading.left for reading in readings), default=math.inf)
-            if least <= enough:
-                alike = min(10.0 * max(least, 1e-3 * self._tolerance), enough)
-                simplest = next(reading for reading in readings if reading.left <= alike)
-                return replace(simplest, is_processed=kind != self._units)
+        reading = self._simplest(self._units(j), enough)
+        if reading is not None:
+            return reading
+        # Differences, means and late rows are nearly alike in a slow motion: all are compared.
+        kinds = (self._late_rows, self._steps, self._limits, self._sums, self._held)
+        processed = itertools.chain.from_iterable(
+            kind(j) for kind in (*kinds, self._differences, self._means)
+        )
+        reading = self._simplest(processed, enough)
+        if reading is not None:
+            return replace(reading, is_processed=True)
         return right if right.left <= self.allowed else None
+
+    def _simplest(self, readings: Iterable[Reading], enough: float) -> Reading | None:
+        """Return the first of some readings that fits about as well as the best of them.
+
+        Parameters
+        ----------
+        readings : the simplest first.
+        enough : what a reading that fits may leave.
+
+        Returns
+        -------
+        Reading or None
+            None where no reading fits.
+        """
+        readings = list(readings)
+        least = min((reading.left for reading in readings), default=math.inf)
+        if not least <= enough:
+            return None
+        alike = min(10.0 * max(least, 1e-3 * self._tolerance), enough)
+        return next(reading for reading in readings if reading.left <= alike)
 
     def _left(self, j: int, expected: Array, values: Array, rounding: Array | float) -> float:
         """Return the largest error per unit of growth in the rows where both numbers are known."""
@@ -248,8 +276,64 @@ class ColumnReadings:
         values, rounding = self.data.values[self._rows, j], self.data.rounding[:, j]
         if np.count_nonzero(np.isfinite(expected)) < _MIN_COMPARED:
             return Reading(text, math.inf, None, rounding)
-        left = self._left(j, expected, values, FLOOR_SAFETY * rounding[self._rows])
+        rounding_here = FLOOR_SAFETY * rounding[self._rows]
+        left = self._left(j, expected, values, rounding_here)
+        # In the same rows the column as it is has to be wrong: where nothing moves, anything fits.
+        is_known = np.isfinite(expected)
+        as_it_is = np.where(is_known, self._expected(j), np.nan)
+        if not left < _FAR_LESS * self._left(j, as_it_is, values, rounding_here):
+            left = math.inf
         return Reading(text, left, None, rounding)
+
+    def _limits(self, j: int) -> Iterator[Reading]:
+        """Yield the reading of a column that is limited to its largest or least number.
+
+        Parameters
+        ----------
+        j : number of the column.
+        """
+        values, expected = self.data.values[:, j], self._expected(j)
+        here = values[self._rows]
+        for which, limit, beyond in (
+            ("most", float(values.max()), expected - here),
+            ("least", float(values.min()), here - expected),
+        ):
+            is_limit = values == limit
+            at_limit = is_limit[self._rows]
+            is_held = np.count_nonzero(is_limit[1:] & is_limit[:-1]) >= _MIN_LIMITED
+            if is_held and (beyond[at_limit] >= -self.allowed).all():
+                known = np.where(is_limit, np.nan, values)
+                unit = self.data.channels[j].unit
+                yield self._inverse(j, f"limited to at {which} {limit:.6g} {unit}", known)
+
+    def _sums(self, j: int) -> Iterator[Reading]:
+        """Yield readings of a pitch to which the rotor is added, and of means of the pitches.
+
+        Parameters
+        ----------
+        j : number of the column.
+        """
+        channel = self.data.channels[j]
+        half = self._states.shape[1] // 2
+        rotor = 0 if channel.kind == "angle" else half
+        if channel.column in (0, half):
+            return
+        which = "rotor's angle" if channel.kind == "angle" else "rotor's rate"
+        expected, of_rotor = self._expected(j), self._states[:, rotor]
+        yield self._forward(j, f"with the {which} added", expected + of_rotor)
+        yield self._forward(j, f"with the {which} subtracted", expected - of_rotor)
+        mean = self._states[:, rotor + 1 : rotor + half].mean(axis=1)
+        yield self._forward(j, "mean of the pitches of all blades", mean)
+
+    def _held(self, j: int) -> Iterator[Reading]:
+        """Yield the reading of a column whose numbers are held for some rows."""
+        values = self.data.values[:, j]
+        changes = np.flatnonzero(np.diff(values)) + 1
+        period = int(np.gcd.reduce(changes)) if len(changes) else 1
+        if period > 1:
+            held = np.full(len(values), np.nan)
+            held[::period] = values[::period]
+            yield self._inverse(j, f"{HELD} for {period} rows", held)
 
     def _differences(self, j: int) -> Iterator[Reading]:
         """Yield readings of differences of angles in place of a rate.
@@ -356,8 +440,14 @@ def _step_between(values: Array) -> float | None:
         return None
     differences = np.diff(distinct)
     step = float(differences.min())
-    if not distinct[-1] - distinct[0] < _MAX_STEPS * step:
-        return None
+    # Euclid's algorithm: a fast column passes several steps from row to row.
+    for _ in range(_MAX_DIVISIONS):
+        if not distinct[-1] - distinct[0] < _MAX_STEPS * step:
+            return None
+        off = np.abs(differences - step * np.round(differences / step))
+        if off.max() <= _WHOLE * step:
+            break
+        step = float(off[off > _WHOLE * step].min())
     # The smallest difference gives the numbers of steps, their sum the step to more digits.
     counts = np.round(differences / step)
     step = float(differences.sum() / counts.sum())

@@ -14,7 +14,7 @@ from scipy.interpolate import make_interp_spline
 from scipy.optimize import linear_sum_assignment
 
 from rotor_mbs.comparison.channels import channels
-from rotor_mbs.comparison.column_readings import LATE_OR_EARLY, ColumnReadings
+from rotor_mbs.comparison.column_readings import HELD, LATE_OR_EARLY, ColumnReadings
 from rotor_mbs.comparison.data import ForeignData
 from rotor_mbs.comparison.data_defects import (
     AT_FLOOR,
@@ -51,6 +51,7 @@ _TIME_ROUNDING = 1e-9  # of the duration
 _MIN_COVERED = 0.3  # of the duration: in a short part of a motion anything fits
 _MAX_PERIOD = 20  # rows from one that is computed to the next
 _FIRST_ROWS, _NEARLY_BETWEEN = 401, 1e-6
+_MIN_SHARE = 0.01  # of a filter from row to row
 _MIN_KNOTS = 5  # fewer rows are on one polynomial, or nearly so
 _NOT_BY_CHANCE = 10.0  # times what is allowed of rows: distance of the right ones from a spline
 _INTERPOLATED = 1e-9  # of the largest number: error of the arithmetic of interpolation
@@ -226,6 +227,7 @@ def _row_hypotheses(search: TrajectorySearch) -> Iterator[Hypothesis[ForeignData
     yield from _rows_between(search)
     if not search.is_within_tolerance:
         yield from _lags(search)
+        yield from _smoothed(search)
     data = search.data
     reversed_time = (data.time[0] + data.time[-1] - data.time)[::-1]
     backward = replace(data.rows(slice(None, None, -1)), time=reversed_time)
@@ -348,6 +350,35 @@ def _lags(search: TrajectorySearch) -> Iterator[Hypothesis[ForeignData]]:
         side = "late" if lag > 0.0 else "early"
         text = f"a constant lag of {lag:.6g} s{in_rows} ({side}): `offset = {-lag:.6g}` of the time"
         yield Hypothesis(text, replace(data, time=data.time - lag))
+
+
+def _smoothed(search: TrajectorySearch) -> Iterator[Hypothesis[ForeignData]]:
+    """Yield the data without a filter of first order in all channels, from the first row on.
+
+    Such a filter moves a number by a share of the distance from the row before to the right one:
+    the share follows by least squares, and the right numbers from the data.
+
+    Parameters
+    ----------
+    search : the data and the reference.
+    """
+    data, inside = search.data, search.up_to_horizon(search.data)
+    steps = np.diff(data.time)
+    if len(inside.time) < MIN_ROWS or np.ptp(steps) > _TIME_ROUNDING * data.time[-1]:
+        return
+    right = search.states_at(inside.time)[:, data.columns]
+    sizes = np.maximum(np.ptp(right, axis=0), search.tolerance)
+    changes = np.diff(inside.values, axis=0) / sizes
+    distances = (right[1:] - inside.values[:-1]) / sizes
+    share = float((changes * distances).sum() / ((distances**2).sum() or 1.0))
+    if not _MIN_SHARE < share < 1.0 - _MIN_SHARE:
+        return
+    values, rounding = data.values.copy(), data.rounding.copy()
+    values[1:] = data.values[:-1] + np.diff(data.values, axis=0) / share
+    rounding[1:] = (2.0 / share - 1.0) * np.maximum(data.rounding[1:], data.rounding[:-1])
+    constant = float(-np.median(steps) / np.log1p(-share))
+    text = f"smoothed by a filter of first order, time constant {constant:.4g} s"
+    yield Hypothesis(text, replace(data, values=values, rounding=rounding))
 
 
 def _clocks(search: TrajectorySearch) -> Iterator[Hypothesis[ForeignData]]:
@@ -485,10 +516,10 @@ def _corrected_channels(readings: ColumnReadings) -> Hypothesis[Correction] | No
             kept.append(j)
             values.append(reading.corrected)
             roundings.append(reading.rounding)
-    # Columns that are processed in different ways fit by chance; and if all columns are late, the
-    # times are wrong, not the columns.
-    is_late = any(text.endswith(LATE_OR_EARLY) for text in processed)
-    if len(processed) > 1 or (is_late and not has_right_motion and len(data.channels) > 1):
+    # Columns that are processed in different ways fit by chance; and if all columns are late or
+    # held, the rows are, not the columns.
+    is_of_rows = any(text.endswith(LATE_OR_EARLY) or text.startswith(HELD) for text in processed)
+    if len(processed) > 1 or (is_of_rows and not has_right_motion and len(data.channels) > 1):
         return None
     mistakes = tuple(f"{', '.join(which)}: {text}" for text, which in names.items() if text)
     if not values:

@@ -19,10 +19,10 @@ from rotor_mbs.comparison.hypotheses import Explanation, Hypothesis, closest, ex
 from rotor_mbs.comparison.other_rotors import (
     Parameter,
     RotorModel,
+    by_rows,
     parameters,
     rotor_hypotheses,
     scenes_with_start,
-    with_held_loads,
 )
 from rotor_mbs.errors import RotorError
 from rotor_mbs.models.lagrange.defects import FIT_ROWS, explicit_steps, quick_ends
@@ -182,19 +182,12 @@ class DefectSearch:
         first_row = self._first_row()
         every = itertools.chain(
             rotor_hypotheses(self._scene),
-            self._loads_per_row(),
+            by_rows(self._scene, self._judged.defects.time.tolist()),
             scenes_with_start(self._scene, first_row),
         )
         for hypothesis in every:
             if not self._share(self._residual(hypothesis.change)) > _PERHAPS:
                 yield hypothesis
-
-    def _loads_per_row(self) -> Iterator[Hypothesis[RotorModel]]:
-        """Yield the scene with loads that are constant between rows, as a controller's are."""
-        scene = self._scene
-        if not scene.has_constant_loads:
-            held = with_held_loads(scene, self._judged.defects.time.tolist())
-            yield Hypothesis("loads held from each row to the next", RotorModel(held))
 
     def _first_row(self) -> Array:
         """Return the first state of the data, (2 (1 + blades),), the scene's where it is fixed."""
@@ -225,7 +218,13 @@ class DefectSearch:
         assert self._steps is not None
         intervals = self._begins, self._ends, self._states, steps * self._steps
         try:
-            ends = quick_ends(model.scene, *intervals, model.accelerations())
+            if model.method is None:
+                ends = quick_ends(model.scene, *intervals, model.accelerations())
+            else:
+                # The method's own error is the difference from fine steps, which replace the
+                # scene's own ends: then the errors of the quick steps do not cancel.
+                intervals = (*intervals[:3], model.steps)
+                ends = quick_ends(model.scene, *intervals, step=model.method)
         except RotorError:
             return np.full_like(self._values, np.inf)
         # The difference of two models by the same steps, in which the errors of the steps cancel.

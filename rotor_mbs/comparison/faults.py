@@ -237,7 +237,12 @@ def _change_of_state(judged: JudgedDefects, row: int) -> str:
     is_share = -_NEARLY <= share <= 1.0 + _NEARLY
     if is_share and rest <= _NEARLY * float(np.linalg.norm(rates)):
         return f"a jump of rates, or a load of one interval, before t = {end:.6g} s"
-    return f"the motion continues from another state after t = {end:.6g} s"
+    text = f"the motion continues from another state after t = {end:.6g} s"
+    sizes = np.abs(judged.values[row])
+    place = int(sizes.argmax())
+    if place < half and np.delete(sizes, place).max() <= _NEARLY * sizes[place]:
+        text += f", or the {_label(judged, place)} is stored from another zero"
+    return text
 
 
 def _state_rate(judged: JudgedDefects, row: int) -> Array:

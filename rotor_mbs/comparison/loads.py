@@ -36,6 +36,9 @@ _FORGOTTEN = {
     "without the weight": LoadParts(weight=0.0),
     "without the accelerations of rotor and pitches": LoadParts(accelerations=0.0),
     "of the weight alone, without inertia forces": LoadParts(accelerations=0.0, rates=0.0),
+    "without the inertia of the hub": LoadParts(hub=0.0),
+    "without the inertia of the blades about their centres of mass": LoadParts(inertia=0.0),
+    "without the dampers of the bearings": LoadParts(dampers=0.0),
 }
 _UNITS = {1.0: "", 1e-3: "kN taken as N", 1e3: "N taken as kN"}
 _FACTORS = [sign * factor for sign in (1.0, -1.0) for factor in _UNITS]

@@ -11,15 +11,17 @@ from typing import Any
 
 import numpy as np
 
+from rotor_mbs.comparison.coarse_methods import Step, coarse_methods
 from rotor_mbs.comparison.hypotheses import Hypothesis
 from rotor_mbs.models.lagrange import closed_form
 from rotor_mbs.models.lagrange.closed_form import Accelerations
+from rotor_mbs.models.lagrange.parameters import rotor_form
 from rotor_mbs.models.lagrange.reference import REDUCED_EQUATIONS, with_azimuths
 from rotor_mbs.models.printed.derivation import Errata
 from rotor_mbs.models.printed.methods import equations, point_mass_rotor
 from rotor_mbs.scenario.catalogue import find_scenes, list_scenes
 from rotor_mbs.scenario.scene import Blade, Scene, scene_fields
-from rotor_mbs.scenario.time_table import LoadTable, value_at
+from rotor_mbs.scenario.time_table import LoadTable, is_constant, value_at
 from rotor_mbs.solution.trajectory import Array
 
 _GRAVITIES = (9.8, 9.80665, 9.81, 9.82, 10.0, 0.0)
@@ -51,6 +53,25 @@ _IN_LOADS_ALONE = ("hub_radius", "hub_mass")
 _LEANING_FIELDS = ("shaft_tilt", "cone")
 # Factors of terms in the equations of motion that are easily wrong.
 _FACTORS = {"without": 0.0, "half of": 0.5, "twice": 2.0, "opposite sign of": -1.0}
+# Other units of torques, springs and dampers: the factor of the number, and the confusion.
+_IN_KILONEWTONS = ((1e-3, "in kN m taken as N m"), (1e3, "in N m taken as kN m"))
+_PER_DEGREE = (
+    (math.pi / 180.0, "per degree taken as per rad"),
+    (180.0 / math.pi, "per rad taken as per degree"),
+)
+_UNITS = {
+    "rotor_torque": ("torque of the rotor", _IN_KILONEWTONS),
+    "pitch_torque": ("pitch torques", _IN_KILONEWTONS),
+    "bearing_stiffness": ("stiffness of the springs", (*_IN_KILONEWTONS, *_PER_DEGREE)),
+    "bearing_damping": ("damping of the bearings", (*_IN_KILONEWTONS, *_PER_DEGREE)),
+}
+_LOADS = {
+    "rotor_torque": "torque of the rotor",
+    "pitch_torque": "pitch torques",
+    "bearing_rest": "rest angles of the springs",
+}
+_CYCLES = (2, 5, 10, 20, 50)  # rows, over which a controller may hold its loads
+_DELAYS = (1, 2, 5, 10, 20, 50, 100)  # rows, by which loads may be late
 # E3 is the power of a term that is zero without E2.
 _ERRATA = ("E1", "E2", "E1 and E2", "E2 and E3", "E1 and E2 and E3")
 
@@ -66,11 +87,15 @@ class RotorModel:
     scene : the rotor.
     azimuths : (blades,) rad, None for those of the scene.
     equations : accelerations in place of the closed form's, None for these.
+    method, steps : a method that is not exact, None for one that is, and the number of its steps
+        from row to row.
     """
 
     scene: Scene
     azimuths: tuple[float, ...] | None = None
     equations: Accelerations | None = None
+    method: Step | None = None
+    steps: int = 1
 
     def accelerations(self) -> Accelerations | None:
         """Return the equations, None for the closed form's own.
@@ -109,8 +134,15 @@ def rotor_hypotheses(scene: Scene) -> Iterator[Hypothesis[RotorModel]]:
     for text, other in other_scenes(scene):
         if other != scene:
             yield Hypothesis(text, RotorModel(other))
+    for sense, sign in (("-", 1.0), ("+", -1.0)):
+        # Only the direction of gravity in the shaft's axes matters, and a tilt turns it. Where tips
+        # and loads are is another matter: this is none of the other scenes.
+        tilted = replace(scene, shaft_tilt=scene.shaft_tilt + sign * math.pi / 2.0)
+        yield Hypothesis(f"gravity along {sense}y of the base", RotorModel(tilted))
     for text, azimuths in other_azimuths(scene):
         yield Hypothesis(text, RotorModel(scene, azimuths))
+    text = "without the gyroscopic moments ω x J ω about the blades' centres of mass"
+    yield Hypothesis(text, RotorModel(scene, equations=_without_own_gyroscopic_moments(scene)))
     for terms, reduced in REDUCED_EQUATIONS.items():
         for text, factor in _FACTORS.items():
             scaled = _with_factor(factor, reduced) if factor else reduced
@@ -208,6 +240,35 @@ def _reaction_of_bearings(angles: Any, rates: Any, form: Any, loads: Any) -> Any
     return -total, [0.0] * len(form.blades)
 
 
+def _reaction_of_dampers(_angles: Any, rates: Any, form: Any, _loads: Any) -> Any:
+    """Return the reactions of the bearings' dampers as if along the shaft."""
+    total: Any = 0.0
+    for blade, rate in zip(form.blades, rates[1:], strict=True):
+        total = total + blade.damping * rate
+    return total, [0.0] * len(form.blades)
+
+
+def _opposite_dampers(_angles: Any, rates: Any, form: Any, _loads: Any) -> Any:
+    """Return the moments that make the bearings' dampers drive."""
+    pairs = zip(form.blades, rates[1:], strict=True)
+    return 0.0, [2.0 * blade.damping * rate for blade, rate in pairs]
+
+
+def _quadratic_dampers(_angles: Any, rates: Any, form: Any, _loads: Any) -> Any:
+    """Return the moments that make the bearings' dampers quadratic in the rate, in rad/s."""
+    pairs = zip(form.blades, rates[1:], strict=True)
+    return 0.0, [blade.damping * rate * (1.0 - np.abs(rate)) for blade, rate in pairs]
+
+
+def _sine_springs(angles: Any, rates: Any, form: Any, loads: Any) -> Any:
+    """Return the moments that make the bearings' springs act by the sine of the deflection."""
+    moments = []
+    for blade, theta, _, _, rest in closed_form.pitches(form, angles, rates, loads):
+        deflection = theta - rest
+        moments.append(blade.stiffness * (deflection - np.sin(deflection)))
+    return 0.0, moments
+
+
 def _gravity_on_pitches(angles: Any, _rates: Any, form: Any, _loads: Any) -> Any:
     """Return the moments that cancel those of gravity about the pitch axes."""
     moments = []
@@ -226,6 +287,45 @@ def _weight_off_axis(angles: Any, rates: Any, form: Any, loads: Any) -> Any:
         arm = blade.weight_x * np.cos(theta) - blade.weight_y * np.sin(theta)
         rotor = rotor - arm * cos_phi
     return rotor, _gravity_on_pitches(angles, rates, form, loads)[1]
+
+
+def _rotor_weight_off_axis(angles: Any, rates: Any, form: Any, loads: Any) -> Any:
+    """Return the rotor's moment that cancels that of weights due to their distances from axes."""
+    return _weight_off_axis(angles, rates, form, loads)[0], [0.0] * len(form.blades)
+
+
+def _with_coupling(factor: float) -> Accelerations:
+    """Return the closed form's equations with another coupling in the mass matrix.
+
+    Parameters
+    ----------
+    factor : of the entries of the mass matrix between rotor and pitches.
+    """
+
+    def equations(angles: Any, rates: Any, form: Any, *rest: Any) -> list[Any]:
+        rotor, *on_pitches = closed_form.accelerations(angles, rates, form, *rest)
+        whole, moment, eliminated, sides = form.inertia, form.inertia * rotor, 0.0, []
+        for blade, theta, pitch in zip(form.blades, angles[1:], on_pitches, strict=True):
+            s, c = np.sin(theta), np.cos(theta)
+            inertia = blade.inertia_ss * s * s + blade.inertia_cc * c * c + blade.inertia_sc * s * c
+            coupling = blade.coupling_s * s + blade.coupling_c * c
+            if blade.lean:
+                inertia = inertia + blade.lean.inertia_s * s + blade.lean.inertia_c * c
+                coupling = coupling + blade.lean.coupling
+            # What the right mass matrix times the right accelerations is: the other terms.
+            side = coupling * rotor + blade.pitch_inertia * pitch
+            moment = moment + inertia * rotor + coupling * pitch
+            coupling = factor * coupling
+            whole = whole + inertia - coupling * coupling / blade.pitch_inertia
+            eliminated = eliminated + coupling * side / blade.pitch_inertia
+            sides.append((side, coupling, blade.pitch_inertia))
+        turned = (moment - eliminated) / whole
+        return [
+            turned,
+            *((side - coupling * turned) / inertia for side, coupling, inertia in sides),
+        ]
+
+    return equations
 
 
 def _gyroscopic_moments(angles: Any, rates: Any, form: Any, _loads: Any) -> Any:
@@ -257,6 +357,30 @@ def _gyroscopic_moments(angles: Any, rates: Any, form: Any, _loads: Any) -> Any:
     return rotor, on_pitches
 
 
+def _without_own_gyroscopic_moments(scene: Scene) -> Accelerations:
+    """Return equations without the moments ω x J ω, J about the centre of mass of each blade.
+
+    Parameters
+    ----------
+    scene : the rotor. A point mass has none of these moments.
+    """
+    # With J about the apex the moments cancel; those of the masses at their centres are added back.
+    own = rotor_form(scene)
+    points = tuple(_without_inertia(blade) for blade in scene.blades)
+    pairs = zip(scene.blades, points, strict=True)
+    if any(blade.has_pitch_inertia != point.has_pitch_inertia for blade, point in pairs):
+        return closed_form.accelerations
+    of_points = rotor_form(replace(scene, blades=points))
+
+    def moments(angles: Any, rates: Any, _form: Any, loads: Any) -> Any:
+        rotor, on_pitches = _gyroscopic_moments(angles, rates, own, loads)
+        rotor_points, pitch_points = _gyroscopic_moments(angles, rates, of_points, loads)
+        pairs = zip(on_pitches, pitch_points, strict=True)
+        return rotor - rotor_points, [whole - point for whole, point in pairs]
+
+    return _with_moments(moments)
+
+
 # Equations with one mistake, of methods by Lagrange's equations or by Newton's and Euler's.
 _OTHER_EQUATIONS = {
     "pitch torques with reactions on the rotor": _with_moments(_reaction_of_torques),
@@ -266,6 +390,15 @@ _OTHER_EQUATIONS = {
     "without gravity in the equations of the pitches": _with_moments(_gravity_on_pitches),
     "weight of the blades on the pitch axes": _with_moments(_weight_off_axis),
     "without the gyroscopic moments ω x J ω of the blades": _with_moments(_gyroscopic_moments),
+    "weight of the blades on the pitch axes in the rotor's equation alone": _with_moments(
+        _rotor_weight_off_axis
+    ),
+    "dampers of the bearings with reactions on the rotor": _with_moments(_reaction_of_dampers),
+    "opposite sign of the dampers of the bearings": _with_moments(_opposite_dampers),
+    "dampers of the bearings quadratic in the rate": _with_moments(_quadratic_dampers),
+    "springs by the sine of the deflection": _with_moments(_sine_springs),
+    "without the coupling of rotor and pitches in the mass matrix": _with_coupling(0.0),
+    "opposite sign of the coupling of rotor and pitches in the mass matrix": _with_coupling(-1.0),
 }
 
 
@@ -314,6 +447,15 @@ def other_scenes(scene: Scene) -> Iterator[tuple[str, Scene]]:
         # A scene has no negative stiffness, damping or inertia, and no motion lasts with it.
         if factor >= 0.0 or field in ("rotor_torque", "pitch_torque"):
             yield f"{amount} {text}", _scaled_at(scene, [(field,)], factor - 1.0)
+    for field, (name, units) in _UNITS.items():
+        for factor, text in units:
+            yield f"{name} {text}", _scaled_at(scene, [(field,)], factor - 1.0)
+    if any(scene.bearing_rest) and any(scene.bearing_damping):
+        text = "dampers of the bearings that act on the rate less that of the rest angle"
+        yield text, _with_damped_error(scene)
+    if any(scene.bearing_stiffness[1:]):
+        springs = (scene.bearing_stiffness[0], *(0.0 for _ in scene.bearing_stiffness[1:]))
+        yield "a spring at blade 1 alone", replace(scene, bearing_stiffness=springs)
     if any(scene.bearing_stiffness):
         unloaded = replace(scene, bearing_rest=())
         yield "rest angles of the springs ignored: taken as 0", unloaded
@@ -336,6 +478,70 @@ def other_scenes(scene: Scene) -> Iterator[tuple[str, Scene]]:
         yield f"pitch angles from another zero: {degrees} degrees where they are 0", turned
 
 
+def by_rows(scene: Scene, times: Sequence[float]) -> Iterator[Hypothesis[RotorModel]]:
+    """Yield methods with steps that divide rows, and loads that are held or late by rows.
+
+    Parameters
+    ----------
+    scene : the rotor as it is.
+    times : s, of all rows.
+    """
+    step = (times[-1] - times[0]) / (len(times) - 1)
+    for text, method, steps in coarse_methods(step):
+        yield Hypothesis(text, RotorModel(scene, method=method, steps=steps))
+    if scene.has_constant_loads:
+        return
+    held = with_held_loads(scene, times)
+    yield from _with_loads_of(scene, held, "held from each row to the next")
+    for rows in _CYCLES:
+        if 2 * rows < len(times):
+            held = with_held_loads(scene, [*times[:-1:rows], times[-1]])
+            how = f"held over a cycle of {rows} rows, {rows * step:.6g} s"
+            yield from _with_loads_of(scene, held, how)
+    for rows in _DELAYS:
+        if rows * step < scene.duration:
+            late = _with_late_loads(scene, rows * step)
+            yield from _with_loads_of(scene, late, f"late by {rows * step:.6g} s")
+
+
+def _with_loads_of(scene: Scene, other: Scene, how: str) -> Iterator[Hypothesis[RotorModel]]:
+    """Yield a scene with all loads of another one, and with each kind of them alone.
+
+    Parameters
+    ----------
+    scene : the rotor as it is.
+    other : the same rotor with other loads.
+    how : the loads are changed, in words.
+    """
+    changed = {}
+    for field in _LOADS:
+        tables = getattr(scene, field)
+        if field == "rotor_torque":
+            tables = (tables,)
+        if not all(is_constant(table) for table in tables):
+            changed[field] = getattr(other, field)
+    if len(changed) > 1:
+        yield Hypothesis(f"loads {how}", RotorModel(replace(scene, **changed)))
+    for field, value in changed.items():
+        # If it is the only load that changes over time, "loads" says no less.
+        name = _LOADS[field] if len(changed) > 1 else "loads"
+        yield Hypothesis(f"{name} {how}", RotorModel(replace(scene, **{field: value})))
+
+
+def _with_late_loads(scene: Scene, delay: float) -> Scene:
+    """Return a scene whose loads come later by a delay in s."""
+
+    def late(table: LoadTable) -> LoadTable:
+        return tuple((time + delay, value) for time, value in table)
+
+    return replace(
+        scene,
+        rotor_torque=late(scene.rotor_torque),
+        pitch_torque=tuple(late(table) for table in scene.pitch_torque),
+        bearing_rest=tuple(late(table) for table in scene.bearing_rest),
+    )
+
+
 def with_held_loads(scene: Scene, times: Sequence[float]) -> Scene:
     """Return a scene whose loads are constant from each of some times, s, to the next."""
     return replace(
@@ -344,6 +550,32 @@ def with_held_loads(scene: Scene, times: Sequence[float]) -> Scene:
         pitch_torque=tuple(_held(table, times) for table in scene.pitch_torque),
         bearing_rest=tuple(_held(table, times) for table in scene.bearing_rest),
     )
+
+
+def _with_damped_error(scene: Scene) -> Scene:
+    """Return a scene whose dampers act on the rate of the pitch less that of the rest angle.
+
+    Parameters
+    ----------
+    scene : the rotor, with rest angles that may change. The moment is added to the pitch torques.
+    """
+    count = len(scene.blades)
+    torques = scene.pitch_torque or ((),) * count
+    rests = scene.bearing_rest or ((),) * count
+    damped = []
+    for torque, rest, damping in zip(torques, rests, scene.bearing_damping, strict=True):
+        rows = {time for table in (torque, rest) for time, _ in table}
+        times = sorted({0.0, *rows, scene.duration})
+        table: list[tuple[float, float]] = []
+        for start, end in itertools.pairwise(times):
+            middle = 0.5 * (start + end)
+            moment = damping * 2.0 * (value_at(rest, middle) - value_at(rest, start))
+            moment /= end - start
+            first = value_at(torque, start)
+            last = 2.0 * value_at(torque, middle) - first  # before a jump at the end
+            table += [(start, first + moment), (end, last + moment)]
+        damped.append(tuple(table))
+    return replace(scene, pitch_torque=tuple(damped))
 
 
 def _held(table: LoadTable, times: Sequence[float]) -> LoadTable:
@@ -374,6 +606,14 @@ def _other_blades(scene: Scene) -> Iterator[tuple[str, Scene]]:
         "products of inertia with opposite sign": _with_opposite_products,
         "products of inertia about the root with opposite sign": _with_opposite_root_products,
         "cone of the blades with opposite sign": lambda blade: replace(blade, cone=-blade.cone),
+        "moments of inertia about x and y exchanged": _with_exchanged_moments,
+        "centre of mass at half its distance from the apex": _with_half_distance,
+        "hub.radius added to the distance of the centre of mass": functools.partial(
+            _with_distance, scene.hub_radius
+        ),
+        "hub.radius subtracted from the distance of the centre of mass": functools.partial(
+            _with_distance, -scene.hub_radius
+        ),
         "without the cone of the blades": lambda blade: replace(blade, cone=0.0),
         "tip used as centre of mass": lambda blade: replace(blade, centre_of_mass=blade.tip),
         "inertia about the root used as inertia about the centre of mass": _with_steiner,
@@ -383,6 +623,7 @@ def _other_blades(scene: Scene) -> Iterator[tuple[str, Scene]]:
     blades = scene.blades
     for text, change in changes.items():
         yield text, replace(scene, blades=tuple(change(blade) for blade in blades))
+    yield "numbers of blade 1 at all blades", replace(scene, blades=(blades[0],) * len(blades))
     for i in _single_blades(scene):
         for j in range(i):
             text = f"numbers of blades {i + 1} and {j + 1} exchanged"
@@ -435,6 +676,23 @@ def _exchanged_bearings(scene: Scene) -> Iterator[tuple[str, Scene]]:
 def _with_mass_on_axis(blade: Blade) -> Blade:
     """Return a blade whose centre of mass is on its pitch axis."""
     return replace(blade, centre_of_mass=(0.0, 0.0, blade.centre_of_mass[2]))
+
+
+def _with_distance(change: float, blade: Blade) -> Blade:
+    """Return a blade whose centre of mass is farther along its pitch axis by a change in m."""
+    x, y, z = blade.centre_of_mass
+    return replace(blade, centre_of_mass=(x, y, z + change))
+
+
+def _with_half_distance(blade: Blade) -> Blade:
+    """Return a blade whose centre of mass is at half its distance along the pitch axis."""
+    return _with_distance(-0.5 * blade.centre_of_mass[2], blade)
+
+
+def _with_exchanged_moments(blade: Blade) -> Blade:
+    """Return a blade with the moments of inertia about its x and y axes exchanged."""
+    xx, yy, *others = blade.inertia
+    return replace(blade, inertia=_inertia([yy, xx, *others]))
 
 
 def _without_inertia(blade: Blade) -> Blade:

@@ -169,7 +169,9 @@ PHYSICS = {
         "numbered in the opposite sense",
     ),
     "p13_coupling_sign": Engine(
-        "coupling in the mass matrix reversed", [("= Ja[i, 2]", "= -Ja[i, 2]")]
+        "coupling in the mass matrix reversed",
+        [("= Ja[i, 2]", "= -Ja[i, 2]")],
+        "opposite sign of the coupling of rotor and pitches in the mass matrix",
     ),
     "p14_pitch_sense_in_gravity": Engine(
         "weight turned against the pitch",

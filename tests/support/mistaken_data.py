@@ -11,8 +11,9 @@ from __future__ import annotations
 
 import argparse
 import copy
+import itertools
 import json
-import sys
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -21,6 +22,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy import integrate, interpolate, signal
+
+import rotor_mbs as rm
 
 Array = NDArray[np.float64]
 Scene = dict[str, Any]
@@ -97,7 +100,12 @@ def nrel_scene() -> Scene:
         "bearing": {
             "stiffness": 971.35e6,
             "damping": 206e3,
-            "rest": [[0.5, 0.0], [0.5, float(np.radians(2))], [1.0, float(np.radians(2))], [1.2, 0.0]],
+            "rest": [
+                [0.5, 0.0],
+                [0.5, float(np.radians(2))],
+                [1.0, float(np.radians(2))],
+                [1.2, 0.0],
+            ],
         },
         "shaft": {"damping": torque / speed},
     }
@@ -115,7 +123,9 @@ SCENES: dict[str, Scene] = {
         "bearing": {"stiffness": 6000.0, "damping": 200.0, "rest": 0.1},
         "shaft": {"damping": 500.0},
     },
-    "point_masses": paper_scene([np.pi / 6, np.pi / 4, np.pi / 6, np.pi / 2], [np.pi / 10, 0, 0, 0], 301),
+    "point_masses": paper_scene(
+        [np.pi / 6, np.pi / 4, np.pi / 6, np.pi / 2], [np.pi / 10, 0, 0, 0], 301
+    ),
     "tumbling": paper_scene([0.6, 0.5, 0.0, 0.2], [0.0, -1.0, 1.0, -0.8], 301),
     "two": {
         "blades": 2,
@@ -146,12 +156,20 @@ SCENES: dict[str, Scene] = {
         "initial": {"angles": [0.6, 0.1, -0.2, 0.3], "rates": [1.5, -0.3, 0.5, 0.0]},
         "torque": {
             "rotor": 8000.0,
-            "pitch": [700.0, [[0.2, 0.0], [0.6, 1500.0], [0.6, -900.0]], [[0.0, 0.0], [1.5, 800.0]]],
+            "pitch": [
+                700.0,
+                [[0.2, 0.0], [0.6, 1500.0], [0.6, -900.0]],
+                [[0.0, 0.0], [1.5, 800.0]],
+            ],
         },
         "bearing": {
             "stiffness": [6000.0, 5000.0, 8000.0],
             "damping": [300.0, 500.0, 400.0],
-            "rest": [0.2, [[0.4, 0.0], [1.0, 0.25]], [[0.5, 0.1], [0.5, -0.3], [0.9, -0.3], [1.2, 0.4]]],
+            "rest": [
+                0.2,
+                [[0.4, 0.0], [1.0, 0.25]],
+                [[0.5, 0.1], [0.5, -0.3], [0.9, -0.3], [1.2, 0.4]],
+            ],
         },
         "shaft": {"damping": 4000.0},
     },
@@ -246,8 +264,11 @@ def scene_text(scene: Mapping[str, Any], *, title: str, loads: bool) -> str:
 
 def is_table(value: Any) -> bool:
     """Tell whether a value of a scene is a table of rows [t, value]."""
-    return isinstance(value, list) and bool(value) and isinstance(value[0], list) and (
-        len(value[0]) == 2 and not isinstance(value[0][0], list)
+    return (
+        isinstance(value, list)
+        and bool(value)
+        and isinstance(value[0], list)
+        and (len(value[0]) == 2 and not isinstance(value[0][0], list))
     )
 
 
@@ -385,8 +406,10 @@ class Rotor:
         axis = self.tilt[:, 1]
         if "cone_after_pitch" in self.mistakes:
             pitch_axes = np.array(
-                [self.tilt @ turn_y(angles[0] + 2 * np.pi * i / self.count) @ [0.0, 0.0, 1.0]
-                 for i in range(self.count)]
+                [
+                    self.tilt @ turn_y(angles[0] + 2 * np.pi * i / self.count) @ [0.0, 0.0, 1.0]
+                    for i in range(self.count)
+                ]
             )
         else:
             pitch_axes = turns[:, :, 2]
@@ -490,7 +513,9 @@ class Rotor:
             rotor_weight = dot(weights, cross(axis, on_axis))
         actuator = self.bearing_moments(time, angles, rates, before)
         pitch_torque = self.pitch_torques(time, before)
-        rotor_side = value_at(self.rotor_torque, time, before=before) - self.shaft_damping * rates[0]
+        rotor_side = (
+            value_at(self.rotor_torque, time, before=before) - self.shaft_damping * rates[0]
+        )
         if "torque_reacts" in mistakes:
             rotor_side -= np.sum(pitch_torque)
         if "dampers_react" in mistakes:
@@ -535,7 +560,7 @@ class Rotor:
         for time, state in zip(times, states, strict=True):
             angles, rates = state[: 1 + self.count], state[1 + self.count :]
             geometry = self.geometry(angles)
-            turns, axis, _, centres, inertias = geometry
+            turns, axis, _, centres, _ = geometry
             accelerations = self.accelerations(time, state, before=time > 0)
             if "loads_without_accelerations" in mistakes:
                 accelerations = 0.0 * accelerations
@@ -594,7 +619,7 @@ def integrate_exactly(rotor: Rotor, tolerance: float = 1e-12, method: str = "DOP
     states = np.empty((len(times), 2 * (1 + rotor.count)))
     state = rotor.initial_state()
     states[0] = state
-    for start, stop in zip(bounds[:-1], bounds[1:], strict=True):
+    for start, stop in itertools.pairwise(bounds):
 
         def slope(time: float, y: Array, start: float = start, stop: float = stop) -> Array:
             # At both ends the loads of this interval, not those beyond a jump.
@@ -602,10 +627,14 @@ def integrate_exactly(rotor: Rotor, tolerance: float = 1e-12, method: str = "DOP
 
         inside = (times > start + 1e-12) & (times <= stop + 1e-12)
         points = np.append(np.minimum(times[inside], stop), stop)
-        for k, point in enumerate(points[:-1]):
-            points[k] = point
         solution = integrate.solve_ivp(
-            slope, (start, stop), state, method, rtol=tolerance, atol=tolerance, dense_output=False,
+            slope,
+            (start, stop),
+            state,
+            method,
+            rtol=tolerance,
+            atol=tolerance,
+            dense_output=False,
             t_eval=np.unique(points),
         )
         states[inside] = solution.y.T[: np.count_nonzero(inside)]
@@ -617,8 +646,13 @@ def integrate_adaptively(rotor: Rotor, method: str, relative: float, absolute: f
     """Return the states of one of SciPy's methods with loose tolerances, across all kinks."""
     times = rotor.times()
     solution = integrate.solve_ivp(
-        rotor.slope, (0.0, times[-1]), rotor.initial_state(), method, times,
-        rtol=relative, atol=absolute,
+        rotor.slope,
+        (0.0, times[-1]),
+        rotor.initial_state(),
+        method,
+        times,
+        rtol=relative,
+        atol=absolute,
     )
     return solution.y.T
 
@@ -892,7 +926,7 @@ def move_centre(change: Callable[[float, float, float], list[float]]) -> Any:
 def hold_rows(table: list[list[float]]) -> list[list[float]]:
     """Return a table with each value held until the next row."""
     rows = [table[0]]
-    for (_, value), (time, after) in zip(table[:-1], table[1:], strict=True):
+    for (_, value), (time, after) in itertools.pairwise(table):
         rows += [[time, value], [time, after]]
     return rows
 
@@ -929,8 +963,10 @@ def extend_rows(table: list[list[float]]) -> list[list[float]]:
 
 def smooth_jumps(table: list[list[float]]) -> list[list[float]]:
     """Return a table whose jumps are ramps from the row before (the first row is dropped)."""
-    rows = [row for k, row in enumerate(table) if k + 1 == len(table) or table[k + 1][0] != row[0]]
-    return rows
+    is_before_jump = [row[0] == after[0] for row, after in itertools.pairwise(table)]
+    return [
+        row for row, left_out in zip(table, [*is_before_jump, False], strict=True) if not left_out
+    ]
 
 
 # ---- exports -----------------------------------------------------------------------------------
@@ -1144,11 +1180,6 @@ def encoder(k: int, counts: int) -> Callable[[Data], None]:
     return export
 
 
-def wrap_rotor(data: Data) -> None:
-    """Write the azimuth from 0 to 2 pi, averaged over two rows at the jump as by resampling."""
-    data.angles[:, 0] = np.mod(data.angles[:, 0], 2 * np.pi)
-
-
 def clock(factor: float) -> Callable[[Data], Data]:
     """Return an export with a clock that runs fast."""
     return lambda data: Data(factor * data.time, data.angles, data.rates, data.loads)
@@ -1159,11 +1190,6 @@ def single_precision_clock(data: Data) -> Data:
     step = np.float32(data.time[1])
     times = np.cumsum(np.full(len(data.time), step, dtype=np.float32), dtype=np.float32) - step
     return Data(times.astype(float), data.angles, data.rates, data.loads)
-
-
-def rounded_uneven_times(data: Data) -> Data:
-    """Keep rows at uneven times and write these with two decimals."""
-    return Data(np.round(data.time, 2), data.angles, data.rates, data.loads)
 
 
 def pitch_from_start(data: Data) -> None:
@@ -1339,113 +1365,193 @@ RIGHT: dict[str, Mistake] = {
 
 EQUATIONS: dict[str, Mistake] = {
     "e01": Mistake("free", "gyroscopic moments ω x J ω dropped", equations=("no_gyroscopic",)),
-    "e02": Mistake("tumbling", "Coriolis term of the rotor's equation dropped",
-                   equations=("no_coriolis",)),
-    "e03": Mistake("point_masses", "centrifugal term of the pitch equations dropped",
-                   equations=("no_centrifugal",)),
-    "e04": Mistake("three", "centrifugal term of the pitch equations with the wrong sign",
-                   equations=("centrifugal_sign",)),
-    "e05": Mistake("free", "factor 2 of the Coriolis term of the rotor's equation missing",
-                   equations=("half_coriolis",)),
-    "e06": Mistake("three", "products of inertia with opposite sign",
-                   edit=each_blade(products([-1, -1, -1]))),
-    "e07": Mistake("two", "product of inertia xz with opposite sign",
-                   edit=each_blade(products([1, -1, 1]))),
+    "e02": Mistake(
+        "tumbling", "Coriolis term of the rotor's equation dropped", equations=("no_coriolis",)
+    ),
+    "e03": Mistake(
+        "point_masses",
+        "centrifugal term of the pitch equations dropped",
+        equations=("no_centrifugal",),
+    ),
+    "e04": Mistake(
+        "three",
+        "centrifugal term of the pitch equations with the wrong sign",
+        equations=("centrifugal_sign",),
+    ),
+    "e05": Mistake(
+        "free",
+        "factor 2 of the Coriolis term of the rotor's equation missing",
+        equations=("half_coriolis",),
+    ),
+    "e06": Mistake(
+        "three", "products of inertia with opposite sign", edit=each_blade(products([-1, -1, -1]))
+    ),
+    "e07": Mistake(
+        "two", "product of inertia xz with opposite sign", edit=each_blade(products([1, -1, 1]))
+    ),
     "e08": Mistake("free", "products of inertia dropped", edit=no_blade_products, rates=False),
     "e09": Mistake("two", "Steiner's terms counted twice", edit=each_blade(steiner(1.0))),
-    "e10": Mistake("one", "moments of inertia about x and y exchanged",
-                   edit=each_blade(swap_xx_yy)),
+    "e10": Mistake(
+        "one", "moments of inertia about x and y exchanged", edit=each_blade(swap_xx_yy)
+    ),
     "e11": Mistake("three", "gravity of 9.8 in place of 9.81", edit=set_at("gravity", 9.8)),
     "e12": Mistake("two", "gravity upwards", edit=set_at("down", G_UP)),
-    "e13": Mistake("tilted", "gravity along the shaft's horizontal, +y",
-                   edit=set_at("down", [0.0, 1.0, 0.0])),
-    "e14": Mistake("point_masses", "gravity along +x of the base", edit=set_at("down", [1.0, 0.0, 0.0])),
+    "e13": Mistake(
+        "tilted", "gravity along the shaft's horizontal, +y", edit=set_at("down", [0.0, 1.0, 0.0])
+    ),
+    "e14": Mistake(
+        "point_masses", "gravity along +x of the base", edit=set_at("down", [1.0, 0.0, 0.0])
+    ),
     "e15": Mistake("free", "no gravity", edit=set_at("gravity", 0.0)),
     "e16": Mistake("one", "weight missing in the pitch equation", equations=("no_pitch_weight",)),
     "e17": Mistake("two", "pitch dampers react on the rotor", equations=("dampers_react",)),
-    "e18": Mistake("loads", "rest angle of the springs ignored", edit=drop_key("bearing.rest"),
-                   decimals="%.9g"),
-    "e19": Mistake("three", "pitch torques one blade on",
-                   edit=reorder("torque.pitch", [2, 0, 1])),
-    "e20": Mistake("three", "pitch torques in the opposite sense",
-                   edit=scale_at("torque.pitch", -1.0)),
-    "e21": Mistake("two", "rotor torque in the opposite sense",
-                   edit=scale_at("torque.rotor", -1.0)),
-    "e22": Mistake("four", "torque and command tables held, not interpolated",
-                   edit=both(tables_at("torque.rotor", hold_rows),
-                             tables_at("bearing.rest", hold_rows))),
-    "e23": Mistake("nrel", "pitch command 0.1 s late",
-                   edit=tables_at("bearing.rest", shift_rows(0.1))),
-    "e24": Mistake("three", "pitch command converted to rad a second time",
-                   edit=scale_at("bearing.rest", DEGREE), degrees=True),
-    "e25": Mistake("one", "spring stiffness taken as N m/deg",
-                   edit=scale_at("bearing.stiffness", 180 / np.pi)),
-    "e26": Mistake("free", "blades numbered against the sense of rotation",
-                   equations=("azimuths_reversed",)),
+    "e18": Mistake(
+        "loads", "rest angle of the springs ignored", edit=drop_key("bearing.rest"), decimals="%.9g"
+    ),
+    "e19": Mistake("three", "pitch torques one blade on", edit=reorder("torque.pitch", [2, 0, 1])),
+    "e20": Mistake(
+        "three", "pitch torques in the opposite sense", edit=scale_at("torque.pitch", -1.0)
+    ),
+    "e21": Mistake(
+        "two", "rotor torque in the opposite sense", edit=scale_at("torque.rotor", -1.0)
+    ),
+    "e22": Mistake(
+        "four",
+        "torque and command tables held, not interpolated",
+        edit=both(tables_at("torque.rotor", hold_rows), tables_at("bearing.rest", hold_rows)),
+    ),
+    "e23": Mistake(
+        "nrel", "pitch command 0.1 s late", edit=tables_at("bearing.rest", shift_rows(0.1))
+    ),
+    "e24": Mistake(
+        "three",
+        "pitch command converted to rad a second time",
+        edit=scale_at("bearing.rest", DEGREE),
+        degrees=True,
+    ),
+    "e25": Mistake(
+        "one", "spring stiffness taken as N m/deg", edit=scale_at("bearing.stiffness", 180 / np.pi)
+    ),
+    "e26": Mistake(
+        "free", "blades numbered against the sense of rotation", equations=("azimuths_reversed",)
+    ),
     "e27": Mistake("two", "hub inertia forgotten", edit=drop_key("hub.inertia")),
     "e28": Mistake("free", "blade 2 is 1 % heavier", edit=heavier_blade(1.01, 1)),
-    "e29": Mistake("tilted", "centre of mass at half its distance",
-                   edit=each_blade(move_centre(lambda x, y, z: [x, y, z / 2]))),
+    "e29": Mistake(
+        "tilted",
+        "centre of mass at half its distance",
+        edit=each_blade(move_centre(lambda x, y, z: [x, y, z / 2])),
+    ),
     "e30": Mistake("tilted", "tilt missing", edit=drop_key("shaft.tilt")),
-    "e31": Mistake("tilted", "tilt with opposite sign", edit=scale_at("shaft.tilt", -1.0),
-                   decimals="%.10g"),
+    "e31": Mistake(
+        "tilted", "tilt with opposite sign", edit=scale_at("shaft.tilt", -1.0), decimals="%.10g"
+    ),
     "e32": Mistake("coned", "cone missing", edit=each_blade(lambda blade: blade.pop("cone"))),
-    "e33": Mistake("coned", "cone with opposite sign",
-                   edit=each_blade(lambda blade: blade.update(cone=-blade["cone"]))),
-    "e34": Mistake("four", "cone and tilt both missing",
-                   edit=both(drop_key("shaft.tilt"),
-                             each_blade(lambda blade: blade.pop("cone")))),
+    "e33": Mistake(
+        "coned",
+        "cone with opposite sign",
+        edit=each_blade(lambda blade: blade.update(cone=-blade["cone"])),
+    ),
+    "e34": Mistake(
+        "four",
+        "cone and tilt both missing",
+        edit=both(drop_key("shaft.tilt"), each_blade(lambda blade: blade.pop("cone"))),
+    ),
     "e35": Mistake("one", "shaft damper missing", edit=drop_key("shaft.damping")),
     "e36": Mistake("three", "pitch dampers missing", edit=drop_key("bearing.damping"), rates=False),
-    "e37": Mistake("two", "pitch dampers with opposite sign",
-                   edit=scale_at("bearing.damping", -1.0)),
+    "e37": Mistake(
+        "two", "pitch dampers with opposite sign", edit=scale_at("bearing.damping", -1.0)
+    ),
     "e38": Mistake("three", "pitch torques react on the rotor", equations=("torque_reacts",)),
     "e39": Mistake("three", "all blades are blade 1", edit=first_blade_for_all),
-    "e40": Mistake("free", "y of the centres of mass with opposite sign",
-                   edit=each_blade(move_centre(lambda x, y, z: [x, -y, z]))),
-    "e41": Mistake("two", "rotor torque 1000 times too small (kN m)",
-                   edit=scale_at("torque.rotor", 1e-3)),
-    "e42": Mistake("two", "blades as point masses",
-                   edit=each_blade(lambda blade: blade.update(inertia=[0.0] * 6))),
-    "e43": Mistake("three", "command and torque tables extrapolated after their last row",
-                   edit=tables_at("torque.pitch", extend_rows)),
-    "e44": Mistake("four", "hub radius added to the centres of mass",
-                   edit=each_blade(move_centre(lambda x, y, z: [x, y, z + 1.2]))),
-    "e45": Mistake("nrel", "damper on the pitch error, its rate less the command's",
-                   equations=("damper_of_error",)),
-    "e46": Mistake("one", "spring moment by the sine of the deflection",
-                   equations=("sine_spring",)),
-    "e47": Mistake("loads", "stiffness in the springs of blade 1 alone",
-                   edit=set_at("bearing.stiffness", [2e4, 0.0, 0.0])),
-    "e48": Mistake("free", "coupling of rotor and pitches in the mass matrix dropped",
-                   equations=("no_coupling",)),
-    "e49": Mistake("point_masses", "weights of the blades on the pitch axes in the rotor's equation",
-                   equations=("weight_at_axis",)),
-    "e50": Mistake("coned", "cone applied outside the pitch: the blade leans after it has pitched",
-                   equations=("cone_after_pitch",)),
-    "e51": Mistake("two", "jump of the rotor torque as a ramp from the row before",
-                   edit=tables_at("torque.rotor", smooth_jumps)),
-    "e52": Mistake("four", "rotor torque held over a controller's cycle of 0.05 s",
-                   edit=tables_at("torque.rotor", samples_of_table(0.05, 2.0))),
-    "e53": Mistake("point_masses", "centrifugal term twice (factor 1/2 missing)",
-                   equations=("double_centrifugal",), degrees=True, decimals="%.10f"),
+    "e40": Mistake(
+        "free",
+        "y of the centres of mass with opposite sign",
+        edit=each_blade(move_centre(lambda x, y, z: [x, -y, z])),
+    ),
+    "e41": Mistake(
+        "two", "rotor torque 1000 times too small (kN m)", edit=scale_at("torque.rotor", 1e-3)
+    ),
+    "e42": Mistake(
+        "two",
+        "blades as point masses",
+        edit=each_blade(lambda blade: blade.update(inertia=[0.0] * 6)),
+    ),
+    "e43": Mistake(
+        "three",
+        "command and torque tables extrapolated after their last row",
+        edit=tables_at("torque.pitch", extend_rows),
+    ),
+    "e44": Mistake(
+        "four",
+        "hub radius added to the centres of mass",
+        edit=each_blade(move_centre(lambda x, y, z: [x, y, z + 1.2])),
+    ),
+    "e45": Mistake(
+        "nrel",
+        "damper on the pitch error, its rate less the command's",
+        equations=("damper_of_error",),
+    ),
+    "e46": Mistake(
+        "one", "spring moment by the sine of the deflection", equations=("sine_spring",)
+    ),
+    "e47": Mistake(
+        "loads",
+        "stiffness in the springs of blade 1 alone",
+        edit=set_at("bearing.stiffness", [2e4, 0.0, 0.0]),
+    ),
+    "e48": Mistake(
+        "free",
+        "coupling of rotor and pitches in the mass matrix dropped",
+        equations=("no_coupling",),
+    ),
+    "e49": Mistake(
+        "point_masses",
+        "weights of the blades on the pitch axes in the rotor's equation",
+        equations=("weight_at_axis",),
+    ),
+    "e50": Mistake(
+        "coned",
+        "cone applied outside the pitch: the blade leans after it has pitched",
+        equations=("cone_after_pitch",),
+    ),
+    "e51": Mistake(
+        "two",
+        "jump of the rotor torque as a ramp from the row before",
+        edit=tables_at("torque.rotor", smooth_jumps),
+    ),
+    "e52": Mistake(
+        "four",
+        "rotor torque held over a controller's cycle of 0.05 s",
+        edit=tables_at("torque.rotor", samples_of_table(0.05, 2.0)),
+    ),
+    "e53": Mistake(
+        "point_masses",
+        "centrifugal term twice (factor 1/2 missing)",
+        equations=("double_centrifugal",),
+        degrees=True,
+        decimals="%.10f",
+    ),
     "e54": Mistake("three", "dampers quadratic in the rate", equations=("quadratic_damper",)),
 }
 
 INTEGRATION: dict[str, Mistake] = {
     "i01": Mistake("point_masses", "explicit Euler with a step of 1 ms", solve=stepper(euler, 10)),
-    "i02": Mistake("two", "semi-implicit Euler with a step of 1 ms",
-                   solve=stepper(symplectic_euler, 10)),
-    "i03": Mistake("nrel", "RK4 with a step of 5 ms on a spring of 188 rad/s",
-                   solve=stepper(rk4, 1)),
-    "i04": Mistake("tumbling", "RK45 with default tolerances (1e-3, 1e-6)",
-                   solve=adaptive("RK45", 1e-3, 1e-6)),
+    "i02": Mistake(
+        "two", "semi-implicit Euler with a step of 1 ms", solve=stepper(symplectic_euler, 10)
+    ),
+    "i03": Mistake(
+        "nrel", "RK4 with a step of 5 ms on a spring of 188 rad/s", solve=stepper(rk4, 1)
+    ),
+    "i04": Mistake(
+        "tumbling", "RK45 with default tolerances (1e-3, 1e-6)", solve=adaptive("RK45", 1e-3, 1e-6)
+    ),
     "i05": Mistake("loads", "state in single precision", solve=stepper(rk4, 2, np.float32)),
-    "i06": Mistake("free", "implicit Euler with a step of 2 ms",
-                   solve=stepper(implicit_euler, 5)),
+    "i06": Mistake("free", "implicit Euler with a step of 2 ms", solve=stepper(implicit_euler, 5)),
     "i07": Mistake("coned", "trapezoidal rule with a step of 10 ms", solve=stepper(trapezoidal, 1)),
-    "i08": Mistake("two", "RK45 (1e-6) across the jump of the torque",
-                   solve=adaptive("RK45", 1e-6, 1e-9)),
+    "i08": Mistake(
+        "two", "RK45 (1e-6) across the jump of the torque", solve=adaptive("RK45", 1e-6, 1e-9)
+    ),
     "i09": Mistake("four", "torques held over each step of 10 ms", solve=stepper(rk4_held, 1)),
     "i10": Mistake("one", "Heun's method with a step of 10 ms", solve=stepper(heun, 1)),
 }
@@ -1457,92 +1563,173 @@ EXPORT: dict[str, Mistake] = {
     "x04": Mistake("two", "rates by backward differences", export=backward_rates),
     "x05": Mistake("tilted", "rates by forward differences", export=forward_rates),
     "x06": Mistake("coned", "all channels a row late", export=late),
-    "x07": Mistake("free", "times are those of the ends of the steps: initial state at h",
-                   export=times_one_step_on),
+    "x07": Mistake(
+        "free",
+        "times are those of the ends of the steps: initial state at h",
+        export=times_one_step_on,
+    ),
     "x08": Mistake("one", "first row lost, times from 0", export=first_row_lost),
     "x09": Mistake("three", "a row lost, times numbered on", export=row_lost_times_renumbered),
-    "x10": Mistake("point_masses", "resampled linearly from every fifth row",
-                   export=resample("linear", 5)),
-    "x11": Mistake("free", "resampled by a spline from every tenth row",
-                   export=resample("spline", 10)),
+    "x10": Mistake(
+        "point_masses", "resampled linearly from every fifth row", export=resample("linear", 5)
+    ),
+    "x11": Mistake(
+        "free", "resampled by a spline from every tenth row", export=resample("spline", 10)
+    ),
     "x12": Mistake("two", "smoothed by a Butterworth filter in both directions", export=low_pass),
     "x13": Mistake("coned", "first-order lag of 20 ms in all channels", export=lag(0.02)),
     "x14": Mistake("free", "moving average of three rows", export=moving_average),
     "x15": Mistake("one", "means of the intervals", export=interval_means),
     "x16": Mistake("loads", "every second row held", export=hold(2)),
-    "x17": Mistake("point_masses", "pitch 3 clipped to 90 degrees", export=clip(3, -np.pi / 2, np.pi / 2)),
-    "x18": Mistake("two", "rotor angle 0.5 degrees off (offset of a sensor)",
-                   export=add_to("angles", 0, 0.5 * DEGREE)),
-    "x19": Mistake("free", "pitch 2 0.01 rad off from the middle on",
-                   export=add_to("angles", 2, 0.01, 150)),
-    "x20": Mistake("loads", "pitch rates in deg/s, named rad/s",
-                   export=scale("rates", slice(1, None), 180 / np.pi)),
-    "x21": Mistake("tilted", "rotor rate in rpm, named rad/s",
-                   export=scale("rates", 0, 30 / np.pi)),
+    "x17": Mistake(
+        "point_masses", "pitch 3 clipped to 90 degrees", export=clip(3, -np.pi / 2, np.pi / 2)
+    ),
+    "x18": Mistake(
+        "two",
+        "rotor angle 0.5 degrees off (offset of a sensor)",
+        export=add_to("angles", 0, 0.5 * DEGREE),
+    ),
+    "x19": Mistake(
+        "free", "pitch 2 0.01 rad off from the middle on", export=add_to("angles", 2, 0.01, 150)
+    ),
+    "x20": Mistake(
+        "loads",
+        "pitch rates in deg/s, named rad/s",
+        export=scale("rates", slice(1, None), 180 / np.pi),
+    ),
+    "x21": Mistake(
+        "tilted", "rotor rate in rpm, named rad/s", export=scale("rates", 0, 30 / np.pi)
+    ),
     "x22": Mistake("three", "noise of 1e-5", export=noise(1e-5)),
     "x23": Mistake("coned", "rounded to 16 bits", export=half_precision),
     "x24": Mistake("free", "rotor by an encoder of 4096 counts", export=encoder(0, 4096)),
     "x25": Mistake("two", "pitch 1 a row late", export=both(late_channel("angles", 1))),
     "x26": Mistake("three", "clock 0.1 % fast", export=clock(1.001)),
-    "x27": Mistake("one", "clock summed in single precision", export=single_precision_clock,
-                   solve=None),
+    "x27": Mistake(
+        "one", "clock summed in single precision", export=single_precision_clock, solve=None
+    ),
     "x28": Mistake("loads", "pitches from their initial values", export=pitch_from_start),
     "x29": Mistake("free", "pitch rates with the rotor rate added", export=absolute_rates),
     "x30": Mistake("two", "one wrong value of the rotor angle", export=spike(0, 1e-3)),
     "x31": Mistake("three", "the mean pitch for all blades", export=mean_of_pitches),
-    "x32": Mistake("free", "pitches with opposite sense",
-                   export=both(scale("angles", slice(1, None), -1.0),
-                               scale("rates", slice(1, None), -1.0))),
-    "x33": Mistake("tilted", "rotor with opposite sense, angle alone",
-                   export=scale("angles", 0, -1.0)),
+    "x32": Mistake(
+        "free",
+        "pitches with opposite sense",
+        export=both(scale("angles", slice(1, None), -1.0), scale("rates", slice(1, None), -1.0)),
+    ),
+    "x33": Mistake(
+        "tilted", "rotor with opposite sense, angle alone", export=scale("angles", 0, -1.0)
+    ),
     "x34": Mistake("point_masses", "rates held over four rows", export=hold_rates(4)),
     "x35": Mistake("loads", "times in ms, named s", export=clock(1000.0)),
-    "x36": Mistake("point_masses", "rotor late by two rows, no rates in the file",
-                   export=late_channel("angles", 0, 2), rates=False),
-    "x37": Mistake("free", "resampled linearly from every second row, no rates in the file",
-                   export=resample("linear", 2), rates=False),
-    "x38": Mistake("nrel", "first-order lag of 5 ms, no rates in the file", export=lag(0.005),
-                   rates=False),
+    "x36": Mistake(
+        "point_masses",
+        "rotor late by two rows, no rates in the file",
+        export=late_channel("angles", 0, 2),
+        rates=False,
+    ),
+    "x37": Mistake(
+        "free",
+        "resampled linearly from every second row, no rates in the file",
+        export=resample("linear", 2),
+        rates=False,
+    ),
+    "x38": Mistake(
+        "nrel", "first-order lag of 5 ms, no rates in the file", export=lag(0.005), rates=False
+    ),
 }
 
 LOAD_MISTAKES: dict[str, Mistake] = {
-    "l01": Mistake("loads", "root loads of the blade on the hub (opposite sign)", loads=True,
-                   export=load_factor("blade_root", -1.0)),
-    "l02": Mistake("loads", "root forces that do not pitch with the blade", loads=True,
-                   export=in_coned_frame("blade_root_force")),
-    "l03": Mistake("loads", "root moments about the apex", loads=True,
-                   equations=("moment_about_apex",)),
-    "l04": Mistake("four", "loads without weight", loads=True,
-                   equations=("loads_without_weight",)),
-    "l05": Mistake("loads", "loads without accelerations", loads=True,
-                   equations=("loads_without_accelerations",)),
+    "l01": Mistake(
+        "loads",
+        "root loads of the blade on the hub (opposite sign)",
+        loads=True,
+        export=load_factor("blade_root", -1.0),
+    ),
+    "l02": Mistake(
+        "loads",
+        "root forces that do not pitch with the blade",
+        loads=True,
+        export=in_coned_frame("blade_root_force"),
+    ),
+    "l03": Mistake(
+        "loads", "root moments about the apex", loads=True, equations=("moment_about_apex",)
+    ),
+    "l04": Mistake("four", "loads without weight", loads=True, equations=("loads_without_weight",)),
+    "l05": Mistake(
+        "loads",
+        "loads without accelerations",
+        loads=True,
+        equations=("loads_without_accelerations",),
+    ),
     "l06": Mistake("nrel", "loads a row late", loads=True, export=load_late("")),
-    "l07": Mistake("loads", "weight of the hub missing in the shaft's force", loads=True,
-                   export=lambda data: data.loads["shaft_force"].__setitem__(
-                       (slice(None), 2), data.loads["shaft_force"][:, 2] - 3000 * 9.81)),
-    "l08": Mistake("four", "shaft loads in the tilted frame", loads=True,
-                   export=in_shaft_frame(-0.09)),
-    "l09": Mistake("loads", "shaft force in axes that turn with the rotor", loads=True,
-                   export=in_rotor_frame("shaft_force")),
-    "l10": Mistake("four", "root moments without the moments of inertia J α + ω x J ω", loads=True,
-                   equations=("loads_without_inertia_moment",)),
-    "l11": Mistake("loads", "shaft moment with the torque of the rotor", loads=True,
-                   equations=("shaft_moment_with_torque",)),
-    "l12": Mistake("loads", "actuator moment without the damper", loads=True,
-                   export=lambda data: data.loads.__setitem__(
-                       "pitch_actuator_moment", data.loads["pitch_actuator_moment"]
-                       + np.array([400.0, 300.0, 200.0]) * data.rates[:, 1:])),
-    "l13": Mistake("four", "loads in kN and kN m, named N and N m", loads=True,
-                   export=load_factor("", 1e-3)),
-    "l14": Mistake("loads", "x and y of the root moments exchanged", loads=True,
-                   export=swap_axes("blade_root_moment", 0, 1)),
-    "l15": Mistake("four", "root moments of blades 2 and 3 exchanged", loads=True,
-                   export=swap_blades("blade_root_moment", 1, 2)),
+    "l07": Mistake(
+        "loads",
+        "weight of the hub missing in the shaft's force",
+        loads=True,
+        export=lambda data: data.loads["shaft_force"].__setitem__(
+            (slice(None), 2), data.loads["shaft_force"][:, 2] - 3000 * 9.81
+        ),
+    ),
+    "l08": Mistake(
+        "four", "shaft loads in the tilted frame", loads=True, export=in_shaft_frame(-0.09)
+    ),
+    "l09": Mistake(
+        "loads",
+        "shaft force in axes that turn with the rotor",
+        loads=True,
+        export=in_rotor_frame("shaft_force"),
+    ),
+    "l10": Mistake(
+        "four",
+        "root moments without the moments of inertia J α + ω x J ω",
+        loads=True,
+        equations=("loads_without_inertia_moment",),
+    ),
+    "l11": Mistake(
+        "loads",
+        "shaft moment with the torque of the rotor",
+        loads=True,
+        equations=("shaft_moment_with_torque",),
+    ),
+    "l12": Mistake(
+        "loads",
+        "actuator moment without the damper",
+        loads=True,
+        export=lambda data: data.loads.__setitem__(
+            "pitch_actuator_moment",
+            data.loads["pitch_actuator_moment"]
+            + np.array([400.0, 300.0, 200.0]) * data.rates[:, 1:],
+        ),
+    ),
+    "l13": Mistake(
+        "four", "loads in kN and kN m, named N and N m", loads=True, export=load_factor("", 1e-3)
+    ),
+    "l14": Mistake(
+        "loads",
+        "x and y of the root moments exchanged",
+        loads=True,
+        export=swap_axes("blade_root_moment", 0, 1),
+    ),
+    "l15": Mistake(
+        "four",
+        "root moments of blades 2 and 3 exchanged",
+        loads=True,
+        export=swap_blades("blade_root_moment", 1, 2),
+    ),
     "l16": Mistake("four", "static loads: weight alone", loads=True, equations=("loads_static",)),
-    "l17": Mistake("nrel", "root moments about the centres of mass", loads=True,
-                   equations=("moment_about_centre_of_mass",)),
-    "l18": Mistake("loads", "shaft moment without the hub's inertia", loads=True,
-                   equations=("shaft_moment_without_hub",)),
+    "l17": Mistake(
+        "nrel",
+        "root moments about the centres of mass",
+        loads=True,
+        equations=("moment_about_centre_of_mass",),
+    ),
+    "l18": Mistake(
+        "loads",
+        "shaft moment without the hub's inertia",
+        loads=True,
+        equations=("shaft_moment_without_hub",),
+    ),
 }
 
 MISTAKES: dict[str, Mistake] = {**EQUATIONS, **INTEGRATION, **EXPORT, **LOAD_MISTAKES}
@@ -1577,3 +1764,240 @@ def write_files(name: str, folder: Path) -> tuple[Path, Path]:
     path = folder / f"{name}.csv"
     make_data(mistake).write(path, mistake.decimals, mistake.degrees)
     return path, scene
+
+
+# ---- comparison and table ----------------------------------------------------------------------
+
+# What a named cause has to say, written when the data had been compared: each of the causes of a
+# file has to match. Equivalent causes are right; "" where no cause is known.
+NAMED: dict[str, str] = {
+    "e01": "gyroscopic moments .* about the blades' centres",
+    "e02": "^without the Coriolis",
+    "e03": "^without the centrifugal",
+    "e04": "^opposite sign of the centrifugal",
+    "e05": "^half of the Coriolis",
+    "e06": "^products of inertia with opposite sign",
+    "e07": "^products of inertia with opposite sign",
+    "e08": "^products of inertia .* ignored",
+    "e09": "inertia about the root used as inertia about the centre of mass",
+    "e10": r"moments of inertia about x and y exchanged|inertia.* off by .* and blade.inertia\[[01]\]",
+    "e11": "^gravity of 9.8 ",
+    "e12": r"gravity along \+z",
+    "e13": r"gravity along \+y",
+    "e14": r"gravity along \+x",
+    "e15": "^gravity of 0 ",
+    "e16": "without gravity in the equations of the pitches",
+    "e17": "^dampers of the bearings with reactions on the rotor",
+    "e18": "^rest angles of the springs ignored",
+    "e19": "torque.pitch of the previous blade at each blade",
+    "e20": "opposite sign of the pitch torques",
+    "e21": "opposite sign of the torque of the rotor",
+    "e22": "^ramps of loads held",
+    "e23": "late by 0.1 s|load that is wrong or missing from t = ",
+    "e24": "rest angles .* rad taken as degrees",
+    "e25": "stiffness .* per rad taken as per degree",
+    "e26": "^blades numbered in the opposite sense",
+    "e27": "^without the hub's inertia",
+    "e28": r"^blade\[1\].mass off by \+1 %",
+    "e29": "^centre of mass at half",
+    "e30": "^without the tilt",
+    "e31": "^tilt of the shaft with opposite sign",
+    "e32": "^without the cone",
+    "e33": "^cone of the blades with opposite sign",
+    "e34": r"shaft.tilt off by \+0.09 rad .*blade.cone off by \+0.06 rad",
+    "e35": "^without the damper of the shaft",
+    "e36": "^without the dampers of the bearings",
+    "e37": "^opposite sign of the dampers",
+    "e38": "^pitch torques with reactions",
+    "e39": "^numbers of blade 1 at all blades",
+    "e40": r"centre_of_mass\[1\] with opposite sign",
+    "e41": "torque of the rotor in kN m taken as N m",
+    "e42": "as point masses",
+    "e43": "load that is wrong or missing from t = 1.5.* on the pitch 3",
+    "e44": "hub.radius added",
+    "e45": "rate less that of the rest angle",
+    "e46": "springs by the sine",
+    "e47": "a spring at blade 1 alone",
+    "e48": "^without the coupling of rotor and pitches",
+    "e49": "on the pitch axes in the rotor's equation alone",
+    "e51": "load that is wrong or missing from t = .* to 1 s: .* on the rotor",
+    "e52": "torque of the rotor held over a cycle of 5 rows",
+    "e53": "^twice the centrifugal",
+    "e54": "quadratic in the rate",
+    "i01": "^explicit Euler method with a step of 0.001 s",
+    "i02": "^semi-implicit Euler method with a step of 0.001 s",
+    "i06": "^implicit Euler method with a step of 0.002 s",
+    "i07": "^trapezoidal rule with a step of 0.01 s",
+    "i09": "^loads held from each row",
+    "i10": "^Heun's method with a step of 0.01 s",
+    "x01": "exchanged: pitch 1 is pitch 2, pitch 2 is pitch 1",
+    "x02": "exchanged: pitch 2 rate is pitch 3 rate",
+    "x03": "differences of the angles over two intervals",
+    "x04": "differences of the angles, the mean over the interval before",
+    "x05": "differences of the angles, the mean over the interval after",
+    "x06": "constant lag of 0.01 s, 1 rows",
+    "x07": "constant lag of 0.01 s, 1 rows",
+    "x08": "constant lag of -0.01 s, 1 rows",
+    "x09": "a row omitted and the others renumbered",
+    "x10": "interpolated linearly between every 5 rows",
+    "x11": "interpolated by a cubic spline between every 10 rows",
+    "x13": "filter of first order, time constant 0.02 s",
+    "x14": "mean of 3 rows around",
+    "x15": "mean of 2 rows up to",
+    "x16": "every row is held for 2 rows",
+    "x17": "^pitch 3: limited to at most 1.5708",
+    "x18": "^rotor: zero off by 0.00872665",
+    "x19": "pitch 2 is stored from another zero",
+    "x20": "rate: deg/s taken as rad/s",
+    "x21": "^rotor rate: rpm taken as rad/s",
+    "x22": "scatter from row to row, standard deviation 1.0e-05",
+    "x23": "half precision",
+    "x24": "^rotor: .* 4096 a turn",
+    "x25": "^pitch 1: a row late",
+    "x26": "clock that is 0.1 % fast",
+    "x27": "single precision|clock that is 7.168e-05 % slow",
+    "x28": "^pitch .: zero off by",
+    "x29": "rate: with the rotor's rate added",
+    "x30": "a single wrong row: row 201",
+    "x31": "mean of the pitches",
+    "x32": "sign reversed",
+    "x33": "^rotor: sign reversed",
+    "x34": "rate: every number is held for 4 rows",
+    "x35": "time in ms taken as s",
+    "x36": "^rotor: 2 rows late",
+    "x37": "interpolated linearly between every 2 rows",
+    "x38": "filter of first order, time constant 0.005 s",
+    "l01": "sign reversed",
+    "l02": "in the (rotor|coned) frame",
+    "l03": "about the apex in place of the root",
+    "l04": "without the weight",
+    "l05": "without the accelerations",
+    "l06": "blade root .*a row late",
+    "l07": "without the hub's weight",
+    "l08": "in the shaft frame",
+    "l09": "^shaft force x, shaft force z: in the rotor frame",
+    "l10": "without the inertia of the blades about their centres of mass",
+    "l11": "with the torque on the rotor in it",
+    "l12": "pitch actuator moment .*without the dampers",
+    "l13": "kN taken as N",
+    "l14": "exchanged: blade root moment 1 x is blade root moment 1 y",
+    "l15": "exchanged: blade root moment 2 x is blade root moment 3 x",
+    "l16": "of the weight alone",
+    "l17": "about the centre of mass in place of the root",
+    "l18": "^shaft moment y: without the inertia of the hub",
+}
+# Differences below the tolerance of 1e-6 rad, which no verdict has to refuse.
+TOO_SMALL = {"i05"}
+
+
+def verdict_of(name: str, status: str, causes: Sequence[str]) -> str:
+    """Return what a comparison is worth: right, none, WRONG, OK or small.
+
+    Parameters
+    ----------
+    name : of a mistake, or of right data.
+    status : of the comparison.
+    causes : that are named.
+
+    Returns
+    -------
+    str
+        "right" if all causes say the mistake, and for right data if it is `ok` without a cause;
+        "none" without a cause; "WRONG" if one is false; "OK" if the mistake is `ok`; "small" if
+        that is right, since the difference is below the tolerance.
+    """
+    if name in RIGHT:
+        return "right" if status == "ok" and not causes else "WRONG"
+    pattern = NAMED.get(name, "")
+    if any(not pattern or not re.search(pattern, cause) for cause in causes):
+        return "WRONG"
+    if status == "ok":
+        return "small" if name in TOO_SMALL else "OK"
+    return "right" if causes else "none"
+
+
+def compared(name: str, folder: Path) -> dict[str, Any]:
+    """Return status and causes of a comparison, from FOLDER/NAME.json if they are there."""
+    kept = folder / f"{name}.json"
+    if not kept.exists():
+        comparison = rm.compare(*map(str, write_files(name, folder)))
+        result = {"status": comparison.status, "likely": list(comparison.likely)}
+        kept.write_text(json.dumps(result, indent=1), encoding="utf-8")
+    result = json.loads(kept.read_text(encoding="utf-8"))
+    return dict(result)
+
+
+def table(folder: Path, names: Sequence[str]) -> str:
+    """Return the document's table of the comparisons of some data.
+
+    Parameters
+    ----------
+    folder : keeps the comparisons.
+    names : of the data.
+
+    Returns
+    -------
+    str
+        Counts, and a table in Markdown.
+    """
+    rows, verdicts = [], []
+    for name in names:
+        result = compared(name, folder)
+        verdict = verdict_of(name, result["status"], result["likely"])
+        causes = []
+        for cause in result["likely"]:
+            channels, colon, text = cause.rpartition(": ")
+            if len(channels) > _MAX_CHANNELS:
+                channels = channels[:_MAX_CHANNELS].rpartition(", ")[0] + ", ..."
+            causes.append(channels + colon + text)
+        cause = "; ".join(causes) or "no cause found"
+        if name not in RIGHT:
+            verdicts.append(verdict)
+            mistake = ALL[name]
+            text = f"{mistake.scene} | {mistake.text}"
+            rows.append(f"| {name} | {text} | {result['status']} | {cause} | {verdict} |")
+    right = [name for name in names if name in RIGHT]
+    wrong = [name for name in right if verdict_of(name, **_arguments(folder, name)) != "right"]
+    lines = [
+        f"{len(verdicts)} mistakes: {verdicts.count('right')} named, {verdicts.count('none')} "
+        f"without a cause, {verdicts.count('WRONG')} with a wrong one,",
+        f"{verdicts.count('OK')} `ok`, {verdicts.count('small')} too small to be refused. Of "
+        f"{len(right)} right data {len(wrong)} are refused or have a cause.",
+        "",
+        "| data | scene | mistake | status | causes | judged |",
+        "|---|---|---|---|---|---|",
+        *rows,
+    ]
+    return "\n".join(lines) + "\n"
+
+
+_MAX_CHANNELS = 60  # characters of the channels' names in the table
+
+
+def _arguments(folder: Path, name: str) -> dict[str, Any]:
+    """Return status and causes of a comparison by their names in `verdict_of`."""
+    result = compared(name, folder)
+    return {"status": result["status"], "causes": result["likely"]}
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Compare the data, and print the table or write it into the document."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("-o", "--output", type=Path, help="the document whose table is replaced")
+    parser.add_argument("--data", help="names, separated by commas (default: all)")
+    options = parser.parse_args(arguments)
+    names = options.data.split(",") if options.data else list(ALL)
+    options.folder.mkdir(parents=True, exist_ok=True)
+    text = table(options.folder, names)
+    if options.output is None:
+        print(text, end="")
+        return
+    head = options.output.read_text(encoding="utf-8").partition(MARKER)[0]
+    options.output.write_text(f"{head}{MARKER}\n\n{text}", encoding="utf-8")
+
+
+MARKER = "<!-- tables -->"
+
+if __name__ == "__main__":
+    main()

@@ -567,6 +567,17 @@ def explicit_steps(scene: Scene, intervals: Array, states: Array, most: int) -> 
     return max(math.ceil(steps), 1) if steps <= most else None
 
 
+def runge_kutta_step(
+    derivative: Callable[[Array, Array], Array], time: Array, state: Array, h: Array
+) -> Array:
+    """Return the state after a step of the classical Runge-Kutta method of order 4."""
+    k1 = derivative(time, state)
+    k2 = derivative(time + 0.5 * h, state + 0.5 * h * k1)
+    k3 = derivative(time + 0.5 * h, state + 0.5 * h * k2)
+    k4 = derivative(time + h, state + h * k3)
+    return np.asarray(state + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4))
+
+
 def quick_ends(
     scene: Scene,
     begins: Array,
@@ -574,6 +585,7 @@ def quick_ends(
     states: Array,
     steps: int,
     equations: Accelerations | None = None,
+    step: Callable[..., Array] | None = None,
 ) -> Array:
     """Compute the states at the ends of all intervals at once, by Runge-Kutta steps of order 4.
 
@@ -587,11 +599,13 @@ def quick_ends(
     states : (m, ..., n) at `begins`, angles, then rates, of the coordinates that move.
     steps : number of steps in each interval.
     equations : the accelerations to integrate; the closed form's where left out.
+    step : another method, called as step(derivative, t, state, h).
 
     Returns
     -------
     ndarray, shape (m, ..., n)
     """
+    step = step or runge_kutta_step
     form, half = rotor_form(scene), len(states) // 2
     equations = equations or closed_form.accelerations
     h = (ends - begins) / steps
@@ -609,11 +623,7 @@ def quick_ends(
         )
 
     with np.errstate(all="ignore"):
-        for step in range(steps):
-            at = begins + step * h
-            k1 = derivative(at, states)
-            k2 = derivative(at + 0.5 * h, states + 0.5 * h * k1)
-            k3 = derivative(at + 0.5 * h, states + 0.5 * h * k2)
-            k4 = derivative(at + h, states + h * k3)
-            states = states + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+        for number in range(steps):
+            at = begins + number * h
+            states = step(derivative, at, states, h)
     return states

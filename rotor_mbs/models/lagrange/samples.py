@@ -14,7 +14,7 @@ moment of the hub on the blade, about its root, are
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any, NamedTuple
 
@@ -240,11 +240,17 @@ class LoadParts:
     weight : factor of gravity.
     accelerations : factor of the coordinates' accelerations.
     rates : factor of the rates, on which the other inertia forces depend.
+    hub : factor of the hub's inertia, in the shaft's moment.
+    inertia : factor of the blades' inertia about their centres of mass, in roots and shaft.
+    dampers : factor of the dampers in the moments of the pitch actuators.
     """
 
     weight: float = 1.0
     accelerations: float = 1.0
     rates: float = 1.0
+    hub: float = 1.0
+    inertia: float = 1.0
+    dampers: float = 1.0
 
 
 def sampled_loads(
@@ -442,6 +448,8 @@ def _loads(
     actuators = np.zeros_like(angles[:, 1:])
     for column in moving[1:]:
         stiffness, damping = scene.bearings[column - 1]
+        if parts is not None:
+            damping *= parts.dampers
         torque, rest = applied[torque_place(column)], applied[rest_place(column)]
         actuators[:, column - 1] = (
             torque - stiffness * (angles[:, column] - rest) - damping * rates[:, column]
@@ -450,6 +458,7 @@ def _loads(
     if parts is not None:
         gravity, rates = parts.weight * gravity, parts.rates * rates
         accelerations = parts.accelerations * accelerations
+        scene = _with_inertia(scene, parts)
     roots, shaft_force, shaft_moment = _reactions(
         scene, angles, rates, accelerations, gravity, convert, sin, cos
     )
@@ -458,6 +467,15 @@ def _loads(
     if scene.hub_mass:
         shaft_force[:, 2] += scene.hub_mass * gravity
     return named_loads(roots, shaft_force, shaft_moment, actuators)
+
+
+def _with_inertia(scene: Scene, parts: LoadParts) -> Scene:
+    """Return a scene whose hub, and blades about their centres of mass, have other inertia."""
+    blades = []
+    for blade in scene.blades:
+        xx, yy, zz, xy, xz, yz = (parts.inertia * element for element in blade.inertia)
+        blades.append(replace(blade, inertia=(xx, yy, zz, xy, xz, yz)))
+    return replace(scene, blades=tuple(blades), hub_inertia=parts.hub * scene.hub_inertia)
 
 
 def _add_about_shaft(moments: Numbers, sizes: Numbers, scene: Scene, convert: Convert) -> None:

@@ -1,0 +1,88 @@
+"""Integration methods of a constant step, whose own error may be the difference of data."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from rotor_mbs.models.lagrange.defects import runge_kutta_step
+from rotor_mbs.solution.trajectory import Array
+
+Derivative = Callable[[Array, Array], Array]
+# Called as step(derivative, t, y, h), returns y at t + h.
+Step = Callable[[Derivative, Array, Array, Array], Array]
+
+_ITERATIONS = 12  # of an implicit method: steps are short beside the motion
+_STEPS = (1, 2, 4, 5, 10, 20, 25, 50, 100)  # from row to row
+
+
+def _euler(derivative: Derivative, time: Array, state: Array, h: Array) -> Array:
+    """Return the state after an explicit Euler step."""
+    return state + h * derivative(time, state)
+
+
+def _semi_implicit_euler(derivative: Derivative, time: Array, state: Array, h: Array) -> Array:
+    """Return the state after an Euler step of the rates, then one of the angles by new rates."""
+    half = len(state) // 2
+    rates = state[half:] + h * derivative(time, state)[half:]
+    return np.concatenate([state[:half] + h * rates, rates])
+
+
+def _implicit_euler(derivative: Derivative, time: Array, state: Array, h: Array) -> Array:
+    """Return the state after an implicit Euler step, solved by iteration."""
+    end = _euler(derivative, time, state, h)
+    for _ in range(_ITERATIONS):
+        end = state + h * derivative(time + h, end)
+    return end
+
+
+def _heun(derivative: Derivative, time: Array, state: Array, h: Array) -> Array:
+    """Return the state after a step of Heun's method of order 2."""
+    first = derivative(time, state)
+    return state + 0.5 * h * (first + derivative(time + h, state + h * first))
+
+
+def _midpoint(derivative: Derivative, time: Array, state: Array, h: Array) -> Array:
+    """Return the state after a step of the explicit midpoint rule."""
+    middle = state + 0.5 * h * derivative(time, state)
+    return state + h * derivative(time + 0.5 * h, middle)
+
+
+def _trapezoidal(derivative: Derivative, time: Array, state: Array, h: Array) -> Array:
+    """Return the state after a step of the trapezoidal rule, solved by iteration."""
+    first = derivative(time, state)
+    end = state + h * first
+    for _ in range(_ITERATIONS):
+        end = state + 0.5 * h * (first + derivative(time + h, end))
+    return end
+
+
+# The method, and the largest number of its steps from row to row that is tried.
+_METHODS: dict[str, tuple[Step, int]] = {
+    "explicit Euler method": (_euler, 100),
+    "semi-implicit Euler method": (_semi_implicit_euler, 100),
+    "implicit Euler method": (_implicit_euler, 20),
+    "Heun's method": (_heun, 20),
+    "explicit midpoint rule": (_midpoint, 20),
+    "trapezoidal rule": (_trapezoidal, 20),
+    "classical Runge-Kutta method": (runge_kutta_step, 4),
+}
+
+
+def coarse_methods(interval: float) -> Iterator[tuple[str, Step, int]]:
+    """Yield methods with steps so long that they may be the cause of a difference.
+
+    Parameters
+    ----------
+    interval : s, between two rows of the data.
+
+    Yields
+    ------
+    str, Step, int
+        The method and its step in words, the method, and the number of steps from row to row.
+    """
+    for name, (step, most) in _METHODS.items():
+        for count in _STEPS:
+            if count <= most:
+                yield f"{name} with a step of {interval / count:.6g} s", step, count
