@@ -30,7 +30,10 @@ def test_checks_of_a_file_are_a_sequence_that_says_what_failed(
     checks = rm.check(path)
     assert checks.passed
     assert {"status", "defect", "tip"} <= {check.name for check in checks}
-    assert len(checks.table().rows) == len(checks)
+    table = checks.table()
+    assert table.passed.all()
+    assert table.value.tolist() == [check.value for check in checks]
+    assert table.method.tolist() == [check.where.method for check in checks]
     assert repr(checks) == f"{len(checks)} checks passed, 0 failed"
     missing = rm.check(path, require="exudyn_tree/rk67")
     assert not missing.passed
@@ -53,6 +56,10 @@ def test_a_bench_measures_a_ladder_and_keeps_it(scene: rm.Scene, tmp_path: Path)
     assert list(curves) == ["paper/fig03/exudyn_tree/rk44"]
     curve = curves["paper/fig03/exudyn_tree/rk44"]
     assert np.nanmin(curve["angle_error_max"]) < 1e-9
+    table = curves.table()
+    np.testing.assert_array_equal(table.run_time_s, curve["run_time_s"])
+    assert table.attrs["run_time_s"]["units"] == "s"
+    assert set(table.status) <= {"ok", "inaccurate", "left_out", "diverged", "solver_failed"}
     again = rm.bench(scene, "exudyn_tree/rk44", output=path, repeats=1, budget=0.5, progress=False)
     np.testing.assert_array_equal(
         again["paper/fig03/exudyn_tree/rk44"]["run_time_s"], curve["run_time_s"]

@@ -12,9 +12,11 @@ from typing import Any
 from rotor_mbs.analysis.text_tables import TextTable, bench_table
 from rotor_mbs.api.results import TemporaryFolder
 from rotor_mbs.api.runs import refuse_losses, texts
+from rotor_mbs.api.tables import data_frame
 from rotor_mbs.errors import InputError, MethodRefusal, shown_value
 from rotor_mbs.methods.catalogue import check_names
 from rotor_mbs.processes import cores
+from rotor_mbs.runs.design import COLUMNS
 from rotor_mbs.runs.progress import progress_of_call
 from rotor_mbs.runs.read import read_records
 from rotor_mbs.scenario.catalogue import scene_of
@@ -127,12 +129,21 @@ class BenchCurves(Mapping[str, Mapping[str, Any]]):
     def __len__(self) -> int:
         return len(self._records)
 
-    def table(self) -> TextTable:
-        """Return a table with a row per curve.
+    def table(self) -> Any:
+        """Return a pandas DataFrame with a row per point: a curve at one of its settings.
 
-        It has the smallest error (rad), and the run time (s) at which errors are reached.
+        It has every number that is stored of a point, and its status; `table.attrs["run_time_s"]`
+        are the attributes of a column: `units` and `long_name`.
         """
-        return bench_table(list(self._records.values()))
+        values: dict[str, list[Any]] = {"curve": [], "status": [], "message": []}
+        for label, record in self._records.items():
+            values["curve"] += [label] * len(record.statuses)
+            values["status"] += record.statuses
+            values["message"] += record.messages
+            for name, array in record.arrays.items():
+                if name not in ("status", "crc32"):
+                    values.setdefault(name, []).extend(array.tolist())
+        return data_frame(values, COLUMNS)
 
     def to_html(self, folder: str | os.PathLike[str]) -> Path:
         """Write the page into a folder, and return its path."""
@@ -141,10 +152,14 @@ class BenchCurves(Mapping[str, Mapping[str, Any]]):
         return write_report(self.path, file_path(folder))
 
     def __repr__(self) -> str:
-        return f"{self._headline()}\n{self.table()}"
+        return f"{self._headline()}\n{self._summary()}"
 
     def _repr_html_(self) -> str:
-        return f"<p>{escape(self._headline())}</p>{self.table()._repr_html_()}"
+        return f"<p>{escape(self._headline())}</p>{self._summary()._repr_html_()}"
+
+    def _summary(self) -> TextTable:
+        """Return a row per curve: its smallest error, and the run times at which errors are met."""
+        return bench_table(list(self._records.values()))
 
     def _headline(self) -> str:
         """Return the number of curves, after the path of the file unless it is temporary."""

@@ -5,16 +5,29 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Sequence
 from html import escape
-from typing import overload
+from typing import Any, overload
 
 from rotor_mbs.analysis.checks import Check
 from rotor_mbs.analysis.text_tables import TextTable
 from rotor_mbs.api.runs import texts
+from rotor_mbs.api.tables import data_frame
 from rotor_mbs.methods.catalogue import check_names
 from rotor_mbs.methods.time_limit import valid_seconds
 from rotor_mbs.scenario.accuracy_bounds import read_bounds, shipped_bounds
 from rotor_mbs.scenario.keys import counted
 from rotor_mbs.scenario.toml_file import file_path
+
+_COLUMNS = (
+    "check",
+    "scene",
+    "method",
+    "channel",
+    "passed",
+    "value",
+    "allowed",
+    "unit",
+    "reason",
+)
 
 
 class Checks(Sequence[Check]):
@@ -51,30 +64,37 @@ class Checks(Sequence[Check]):
     def __len__(self) -> int:
         return len(self._checks)
 
-    def table(self) -> TextTable:
-        """Return a table with a row per check.
+    def table(self) -> Any:
+        """Return a pandas DataFrame with a row per check.
 
-        It has what was checked, in which run, the value, the bound, and the probable reason of a
-        failure.
+        It has what was checked, in which run, whether it passed, value, bound, their unit, and the
+        probable reason of a failure.
         """
-        return _table(self._checks)
+        values: dict[str, list[Any]] = {name: [] for name in _COLUMNS}
+        for check in self._checks:
+            reason = "" if check.passed else check.hint
+            row = check.name, *check.where, check.passed, check.value, check.bound, check.unit
+            for name, value in zip(_COLUMNS, (*row, reason), strict=True):
+                values[name].append(value)
+        return data_frame(values, {})
 
     def __repr__(self) -> str:
         text = (
             f"{counted(len(self) - len(self.failures), 'check')} passed, {len(self.failures)} "
             "failed"
         )
-        return f"{_table(self.failures)}\n{text}" if self.failures else text
+        return f"{_failures(self.failures)}\n{text}" if self.failures else text
 
     def _repr_html_(self) -> str:
         return f"<pre>{escape(repr(self))}</pre>"
 
 
-def _table(checks: Iterable[Check]) -> TextTable:
+def _failures(checks: Iterable[Check]) -> TextTable:
+    """Return a table of checks that failed, for a screen."""
     rows: list[tuple[str, ...]] = []
     for check in checks:
         numbers = (f"{check.value:.1e}", f"{check.bound:.1e}", check.unit)
-        rows.append((check.name, *check.where, *numbers, "" if check.passed else check.hint))
+        rows.append((check.name, *check.where, *numbers, check.hint))
     return TextTable(
         ("check", "scene", "method", "channel", "value", "allowed", "unit", "reason"), rows
     )

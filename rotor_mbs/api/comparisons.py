@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rotor_mbs.analysis.text_tables import TextTable
+from rotor_mbs.api.tables import data_frame
 from rotor_mbs.comparison.data import load_data
 from rotor_mbs.comparison.modes import compare_modes
 from rotor_mbs.comparison.trajectory import compare_with_reference
@@ -138,9 +138,20 @@ class DataComparison:
         self.status, self.message = self.verdict.status, self.verdict.message
         self.agrees, self.likely = self.verdict.agrees, self.verdict.likely
 
-    def table(self) -> TextTable:
-        """Return a table with a row per channel: errors (rad, rad/s), end of agreement (s)."""
-        return channel_table(self.verdict)
+    def table(self) -> Any:
+        """Return a pandas DataFrame with a row per channel.
+
+        It has the errors up to the horizon and at all in the channel's `unit`, what of the largest
+        defect the digits of the data do not explain, and what they do, in its `defect_unit`, and
+        up to which time (s) the errors stay within each of several levels.
+        """
+        rows = []
+        for channel in self.verdict.channels:
+            row = asdict(channel)
+            ends = row.pop("agrees_until")
+            rows.append(row | {f"within {level} up to": end for level, end in ends.items()})
+        names = list(dict.fromkeys(name for row in rows for name in row))
+        return data_frame({name: [row.get(name) for row in rows] for name in names}, {})
 
     def plot(self) -> Panels:
         """Plot the defects of each coordinate over time with the tolerance.
@@ -202,7 +213,7 @@ class DataComparison:
             *map("  {}".format, verdict.read),
         ]
         lines += [f"  {line}" for line in unused_lines(verdict)]
-        lines += ["", str(self.table()), ""]
+        lines += ["", str(channel_table(self.verdict)), ""]
         if verdict.horizon_s is not None:
             lines.append(
                 f"compared up to {verdict.compared_until:g} s; errors up to the horizon at "
@@ -216,5 +227,5 @@ class DataComparison:
     def _repr_html_(self) -> str:
         return (
             f"<p>{escape(self.status)} "
-            f"{escape(self.message)}</p>{self.table()._repr_html_()}{self.plot()._repr_svg_()}"
+            f"{escape(self.message)}</p>{channel_table(self.verdict)._repr_html_()}{self.plot()._repr_svg_()}"
         )

@@ -31,10 +31,11 @@ from rotor_mbs.analysis.text_tables import (
     run_row,
     sweep_parameters,
 )
+from rotor_mbs.api.tables import data_frame
 from rotor_mbs.errors import InputError, StoreError, shown_value
 from rotor_mbs.methods.catalogue import REFERENCE
 from rotor_mbs.runs.design import COLUMNS
-from rotor_mbs.runs.hdf5 import CHARACTERS, reading
+from rotor_mbs.runs.hdf5 import CHARACTERS, Column, reading
 from rotor_mbs.runs.merge import copy_file
 from rotor_mbs.runs.read import StoredRuns, is_sweep, open_results
 from rotor_mbs.runs.rows import text_of
@@ -52,7 +53,6 @@ if TYPE_CHECKING:
 # Columns with a number or a text of each run.
 _OF_A_RUN = (("run",), ("run", CHARACTERS))
 _JSON = ("settings", "options", "versions", "scene_hash")
-_COLUMN_NAMES = {"method_code": "method_name"}  # in tables, where codes are texts
 
 
 @dataclass(repr=False)
@@ -256,24 +256,16 @@ class Results(Mapping[Any, Any]):
         StoreError
             If a run is damaged.
         """
-        import pandas as pd  # late: 0.3 s
-
         self._stored.verify()
         with reading(self.path):
-            columns = self._stored.columns
-            # JSON texts, which are long, stand at the end.
-            names = sorted(columns, key=_JSON.__contains__)
             values: dict[str, Any] = {}
-            for name in names:
-                if name not in ("run", "crc32") and columns[name].dimensions in _OF_A_RUN:
-                    values[_COLUMN_NAMES.get(name, name)] = self._values(name)
-            table = pd.DataFrame(values, index=pd.Index(list(self._labels), name="run"))
-            for name in names:
-                own = _COLUMN_NAMES.get(name, name)
-                if own in values:
-                    column = columns[name]
-                    table.attrs[own] = {"units": column.units, "long_name": column.long_name}
-        return table
+            about: dict[str, Column] = {}
+            # JSON texts, which are long, stand at the end.
+            for name, column in sorted(self._stored.columns.items(), key=lambda c: c[0] in _JSON):
+                if name not in ("run", "crc32") and column.dimensions in _OF_A_RUN:
+                    shown = "method_name" if name == "method_code" else name  # codes are texts here
+                    values[shown], about[shown] = self._values(name), column
+            return data_frame(values, about, list(self._labels))
 
     def column(self, name: str) -> Any:
         """Return an array of all runs, (runs, ...), such as "status", "pitch_max" or "angles".
