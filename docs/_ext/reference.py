@@ -393,8 +393,9 @@ _EXAMPLES = {
     ),
     "Modes": (
         "`modes` writes a group per scene, model and state (`rest`, `rotation`); Floquet "
-        "multipliers are in a group of `lagrange`. All models have the same variables.",
-        "modes scene.toml --speeds 0.5:1:2 -o modes.h5 -j 1",
+        "multipliers are in a group of `lagrange`. All models have the same variables; those of "
+        "`motion` are left out where no whirl is defined.",
+        "modes stiff/nrel-5mw --speeds 0.5:1:2 -o modes.h5 -j 1",
     ),
     "Comparisons": (
         "`compare` writes the data, the reference and their differences at the times of the data. "
@@ -447,6 +448,7 @@ _ATTRIBUTES = {
     "mode_labels": "names of the modes",
     "coordinate_labels": "names of the coordinates",
     "component_labels": "names of the multiblade coordinates",
+    "motion_labels": "names of the motions in the fixed frame",
     "messages": "reason for each speed without a result",
     "source": "name of the file with the data",
     "status": "ok, inaccurate or unchecked",
