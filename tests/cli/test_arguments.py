@@ -56,7 +56,7 @@ def test_a_value_that_nothing_can_have_is_a_line(words: tuple[str, ...], folder:
 @pytest.mark.parametrize(
     "words",
     [
-        ("modes", "paper/fig03", "--speeds", "-1:3:5"),
+        ("modes", "paper/fig03", "--speeds", "-1:3"),
         ("compare", "data.csv", "--scene", "paper/fig03", "--tolerance", "-1e-6"),
         ("run", "paper/fig03", "--timeout", "-.5e1"),
     ],

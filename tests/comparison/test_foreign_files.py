@@ -277,7 +277,7 @@ WRONG: dict[str, tuple[Callable[[Path], object], str]] = {
     ),
     "a damaged MAT file": (
         lambda path: path.write_bytes(b"MATLAB 5.0 MAT-file".ljust(200)),
-        "cannot be read",
+        "not a MAT file that can be read",
     ),
     "a program": (
         lambda path: path.write_bytes(b"\x7fELF" + bytes(100)),

@@ -318,7 +318,7 @@ def test_two_rows_at_one_time_are_those_beside_a_jump_of_a_load_or_refused() -> 
     compared = rm.compare(columns, scene)
     assert compared.status == "ok"
     assert any(
-        "before a jump of a load are not compared" in note for note in compared.verdict.notes
+        "before a jump of a load is not compared" in note for note in compared.verdict.notes
     )
     columns["angles"][50, 1] += 1e-3
     with pytest.raises(

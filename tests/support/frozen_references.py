@@ -74,7 +74,7 @@ def digests(path: Path) -> str:
     with open_results(path, verify=False) as results:
         references = [scene.reference for scene in results.scenes.values()]
         lines = [
-            f"{array_digest(run.array(name))}  {run.scene} {name}\n"
+            f"{array_digest(run.array(name))}  {run.scene_name} {name}\n"
             for run in references
             for name in run.names
         ]

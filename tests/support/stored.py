@@ -109,7 +109,7 @@ class Arrays:
         settings: Any = (),
         **arrays: Any,
     ) -> None:
-        self.scene, self.method, self.status, self.arrays = "scene", method, status, arrays
+        self.scene_name, self.method, self.status, self.arrays = "scene", method, status, arrays
         self.attributes, self.settings, self.is_frozen = dict(attributes), dict(settings), False
 
     def __contains__(self, name: str) -> bool:
