@@ -317,9 +317,7 @@ def test_two_rows_at_one_time_are_those_beside_a_jump_of_a_load_or_refused() -> 
     columns["shaft_moment_y"][50] += 1e4  # the load before the jump
     compared = rm.compare(columns, scene)
     assert compared.status == "ok"
-    assert any(
-        "before a jump of a load is not compared" in note for note in compared.verdict.notes
-    )
+    assert any("before a jump of a load is not compared" in note for note in compared.verdict.notes)
     columns["angles"][50, 1] += 1e-3
     with pytest.raises(
         rm.InputError,
