@@ -190,7 +190,8 @@
 
     // On paper as many plots stand side by side as the style sheet says, however wide the window is.
     const printedWidth = () => {
-      const grid = box.closest("[class^=grid]"), columns = Number(grid?.className.slice(4) ?? 1);
+      const grid = box.closest("[class^=grid]"), isWide = box.closest(".grid2 > .card:last-child:nth-child(odd)");
+      const columns = isWide ? 1 : Number(grid?.className.slice(4) ?? 1);
       return PRINTED / columns - 40;
     };
 
