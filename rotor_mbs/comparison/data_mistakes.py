@@ -51,6 +51,7 @@ _TIME_ROUNDING = 1e-9  # of the duration
 _MIN_COVERED = 0.3  # of the duration: in a short part of a motion anything fits
 _MAX_PERIOD = 20  # rows from one that is computed to the next
 _FIRST_ROWS, _NEARLY_BETWEEN = 401, 1e-6
+_MAX_ROUNDING = 0.02  # of a difference that a filter explains
 _MIN_SHARE = 0.01  # of a filter from row to row
 _MIN_KNOTS = 5  # fewer rows are on one polynomial, or nearly so
 _NOT_BY_CHANCE = 10.0  # times what is allowed of rows: distance of the right ones from a spline
@@ -376,6 +377,10 @@ def _smoothed(search: TrajectorySearch) -> Iterator[Hypothesis[ForeignData]]:
     values, rounding = data.values.copy(), data.rounding.copy()
     values[1:] = data.values[:-1] + np.diff(data.values, axis=0) / share
     rounding[1:] = (2.0 / share - 1.0) * np.maximum(data.rounding[1:], data.rounding[:-1])
+    # The rounding grows: where it is as large as the difference itself, it would explain anything.
+    difference = float(np.abs(inside.values - right).max())
+    if not FLOOR_SAFETY * float(rounding.max()) <= _MAX_ROUNDING * difference:
+        return
     constant = float(-np.median(steps) / np.log1p(-share))
     text = f"smoothed by a filter of first order, time constant {constant:.4g} s"
     yield Hypothesis(text, replace(data, values=values, rounding=rounding))
