@@ -25,7 +25,6 @@ from rotor_mbs.studies import method_test
 # Of which `test-method` tells that they are wrong, and not why.
 NOT_NAMED = {
     "n05_loose",
-    "p13_coupling_sign",
     "p14_pitch_sense_in_gravity",
     "p19_no_coupling_alpha",
     "p20_hub_radius",
