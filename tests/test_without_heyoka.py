@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.commands import refusal
+from support.commands import refusal, rotor_mbs
 
 import rotor_mbs as rm
 from rotor_mbs.errors import InputError
@@ -26,6 +26,17 @@ def short_scene() -> rm.Scene:
 def test_dop853_is_chosen_in_place_of_taylor() -> None:
     assert DOP853 in default_methods()
     assert TAYLOR not in default_methods()
+
+
+def test_where_no_method_is_named_a_run_and_a_sweep_are_by_dop853(tmp_path: Path) -> None:
+    assert rm.run(short_scene()).method == DOP853
+    runs = rm.sweep(short_scene(), {"gravity": [9.7, 9.8]}, samples=3)
+    assert [(run.method, run.status) for run in runs.values()] == [(DOP853, "ok")] * 2
+    study = tmp_path / "study.toml"
+    axis = '[[axis]]\nkey = "gravity"\nvalues = [9.8]\n'
+    study.write_text(f'title = "x"\nscene = "paper/fig08"\nsamples = 3\n{axis}')
+    planned = rotor_mbs("sweep", study, "--dry-run", "-o", tmp_path / "study.h5")
+    assert planned.out.startswith(f"1 runs with {DOP853}:")
 
 
 def test_a_run_and_a_computed_reference_are_ok() -> None:

@@ -8,7 +8,12 @@ from typing import TYPE_CHECKING, overload
 
 from rotor_mbs.api.results import Results, Run, TemporaryFolder
 from rotor_mbs.errors import InputError, MethodRefusal, ResourceError, shown_value
-from rotor_mbs.methods.catalogue import check_names, problems_of_scene, selected_methods
+from rotor_mbs.methods.catalogue import (
+    check_names,
+    default_method,
+    problems_of_scene,
+    selected_methods,
+)
 from rotor_mbs.methods.method_file import ENDING
 from rotor_mbs.methods.time_limit import valid_seconds
 from rotor_mbs.processes.pool import check_workers
@@ -114,7 +119,7 @@ def run(
 
 def run(
     scene: Scene | str | os.PathLike[str],
-    method: str | Sequence[str] = "lagrange/taylor",
+    method: str | Sequence[str] = "",
     *,
     timeout: float = float("inf"),
     reference: bool = False,
@@ -130,8 +135,9 @@ def run(
         A Scene, the name of a shipped scene, or a TOML file.
     method : str or sequence of str
         "model/integrator", as listed by `rotor-mbs list`, or a Python file that defines methods
-        ("mine.py"), see docs/your-engine.md. For an empty list, methods are selected by the same
-        rule as in `rotor-mbs run`.
+        ("mine.py"), see docs/your-engine.md. By default lagrange/taylor, or lagrange/dop853 where
+        heyoka is not installed. For an empty list, methods are selected by the same rule as in
+        `rotor-mbs run`.
     timeout : float
         Time limit in s for run, reference and assessment of a method. A run that exceeds it has the
         status "timed_out" and the samples computed so far. Loading and compilation, and up to 1 s
@@ -183,6 +189,7 @@ def run(
     scene, timeout = scene_of(scene), valid_seconds(timeout)
     check_workers(workers)
     if isinstance(method, str):
+        method = method or default_method()
         if method.endswith(ENDING):
             method, *others = check_names(method)
             if others:
@@ -219,7 +226,7 @@ def sweep(
     scene: Scene | str | os.PathLike[str],
     parameters: Mapping[str, object],
     *,
-    methods: str | Sequence[str] = ("lagrange/taylor",),
+    methods: str | Sequence[str] = "",
     output: str | os.PathLike[str] | None = None,
     workers: int = 0,
     timeout: float = 60.0,
@@ -237,7 +244,8 @@ def sweep(
     parameters : for each key of a number in a scene file, such as "bearing.stiffness" or
         "initial.angles[1]", a list of values or a table as in an [[axis]] of a sweep file, such as
         `{"uniform": [0.0, 1.0]}`.
-    methods : name of a method, or a list of names; or Python files that define methods.
+    methods : name of a method, or a list of names; or Python files that define methods. By default
+        lagrange/taylor, or lagrange/dop853 where heyoka is not installed.
     output : file of the dataset. A repeated call continues it after an interruption. Default: a
         temporary file.
     workers : number of worker processes; 0: everything runs in this process.
@@ -285,6 +293,8 @@ def sweep(
 
     scene, timeout = scene_of(scene), min(valid_seconds(timeout), _NO_LIMIT_S)
     check_workers(workers)
+    if isinstance(methods, str):
+        methods = methods or default_method()
     names = list(check_names(methods if isinstance(methods, str) else texts(methods)))
     study = sweep_of(scene, plain_value({**parameters}), methods=names, **plain_value(options))
     if output is None:

@@ -140,12 +140,21 @@ def default_methods() -> tuple[str, ...]:
 
     A method that is not installed is replaced by its fallback.
     """
-    names = []
-    for method in methods():
-        if method.is_default:
-            is_replaced = method.fallback and not method.is_installed
-            names.append(method.fallback if is_replaced else method.name)
-    return tuple(names)
+    return tuple(_installed_name(method) for method in methods() if method.is_default)
+
+
+def default_method() -> str:
+    """Return the name of the method of `rm.run` and of sweeps where none is named.
+
+    It is lagrange/taylor, or its fallback where that is not installed.
+    """
+    return _installed_name(find_method("lagrange/taylor"))
+
+
+def _installed_name(method: Method) -> str:
+    """Return the name of a method, or of its fallback where it is not installed."""
+    is_replaced = method.fallback and not method.is_installed
+    return method.fallback if is_replaced else method.name
 
 
 def errata_methods() -> dict[str, str]:

@@ -185,7 +185,8 @@ class Design:
     Attributes
     ----------
     title, scene : of the dataset; the name of a shipped scene, or a file beside the sweep's.
-    methods, settings : names of methods, and settings for those that have them.
+    methods, settings : names of methods, () for the default one, and settings for those that have
+        them.
     change : numbers of the scene, by key, that differ from it in all runs.
     samples, outputs : in place of the scene's; None for these.
     precision : "float64" or "float32", of stored arrays.
@@ -198,7 +199,12 @@ class Design:
 
     title: str = file_key("title", keys.LINE)
     scene: str = file_key("scene", _SCENE_NAME)
-    methods: Sequence[str] = file_key("methods", _METHODS, default=("lagrange/taylor",))
+    methods: Sequence[str] = file_key(
+        "methods",
+        _METHODS,
+        note="; by default lagrange/taylor, or lagrange/dop853 where heyoka is not installed",
+        default=(),
+    )
     settings: Mapping[str, float] = file_key("settings", _SETTINGS, optional={})
     change: Mapping[str, float] = file_key("change", _CHANGE, optional={})
     samples: int | None = file_key(

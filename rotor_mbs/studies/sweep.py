@@ -22,6 +22,7 @@ from rotor_mbs.methods.base import checked_result
 from rotor_mbs.methods.catalogue import (
     Refusal,
     check_names,
+    default_method,
     find_method,
     is_corrected,
     settings_for,
@@ -433,7 +434,7 @@ def plan_sweep(
     Parameters
     ----------
     sweep : as read from its file.
-    methods : names; those of the sweep's file if there are none.
+    methods : names; those of the sweep's file if there are none, or else the default one.
     part : (k, n) for part k of n.
     time_limit_s : time limit of a run in s.
 
@@ -444,7 +445,7 @@ def plan_sweep(
     MethodRefusal
         If all methods refuse the base scene.
     """
-    named = check_names(methods or sweep.design.methods)
+    named = check_names(methods or sweep.design.methods or default_method())
     with sweep.file.with_line_numbers("settings"):
         settings = settings_for(named, sweep.design.settings)
     able, refused = supporting_methods(sweep.base, named, settings)
