@@ -188,6 +188,8 @@ def test_a_producer_of_another_shape_is_refused() -> None:
 
 @pytest.mark.parametrize("method", ["lagrange/taylor", "lagrange/dop853"])
 def test_a_sweep_stores_a_quantity(method: str) -> None:
+    if not find_method(method).is_installed:
+        pytest.skip(f"{method} is not installed")
     scene = rm.scene("paper/fig11").replace(
         duration=0.2, samples=5, outputs=["angles", "rates", "momentum"]
     )

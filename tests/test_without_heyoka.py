@@ -72,5 +72,7 @@ def test_modes_are_computed_but_for_floquet_multipliers() -> None:
     assert modes.agrees
     assert modes.floquet is None
     assert any("no Floquet multipliers" in note for note in modes.notes)
+    with pytest.raises(InputError, match="no Floquet multipliers: heyoka is not installed"):
+        modes.plot.multipliers()
     frequencies = modes.rotation["lagrange"].damped_frequencies
     assert np.isfinite(frequencies).any()

@@ -128,9 +128,11 @@ class ModePlots:
         """
         table = self._modes.floquet
         if table is None:
-            raise InputError(
-                f"{self._modes.scene}: no Floquet multipliers; they need gravity and speeds above 0"
-            )
+            reason = "no Floquet multipliers; they need gravity and speeds above 0"
+            for note in self._modes.notes:  # as where heyoka is not installed
+                if note.startswith("no Floquet multipliers"):
+                    reason = note
+            raise InputError(f"{self._modes.scene}: {reason}")
         panel = panels((2.6,), RPM_AXIS)
         axes = panel.axes[0]
         rpm = table.speeds * RPM
