@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from rotor_mbs.comparison.channels import Channel, channels
 from rotor_mbs.comparison.data import ForeignData
 from rotor_mbs.comparison.hypotheses import Explanation, Hypothesis, cheapest, explanations
+from rotor_mbs.comparison.other_rotors import other_scenes
 from rotor_mbs.comparison.verdict import ChannelErrors, agrees_until
 from rotor_mbs.models.lagrange.samples import LoadParts, sampled_loads
 from rotor_mbs.scenario.scene import Scene
@@ -28,6 +29,7 @@ from rotor_mbs.solution.trajectory import Array, all_coordinates
 _SMALL = 1e-3
 _LOAD_ROUNDING = 16.0 * 2.0**-53  # of that force: rounding of the sums by which a load is computed
 _STATE_STEP = 1e-7  # relative step of a state, for the derivative of the loads
+_FEW_ROWS = 50  # in which another scene is tried first
 MIN_EXPLAINED = 5  # rows: with fewer, something always fits
 MAX_LEFT = 1e-4  # of the largest load, or of a frequency, by a mistake that is named,
 LEFT_SHARE = 1e-2  # and of the difference: another program's own error is no mistake
@@ -94,6 +96,7 @@ class JudgedLoads:
     mistaken : by a mistake, in words, the loads by frame that a program with it computes.
     hub_weight : by frame the share of the hub's weight in the loads.
     time : (n,) s.
+    states : (n, 2 moving) angles and rates of the data, rad and rad/s.
     is_inside : (n,) rows that are neither the first nor the last one.
     values, rounding, expected : (n, channels) N or N m.
     smallest_scale : (channels,) by which an error is judged at least.
@@ -108,6 +111,7 @@ class JudgedLoads:
     is_inside: NDArray[np.bool_]
     hub_weight: Mapping[str, Array]
     time: Array
+    states: Array
     values: Array
     rounding: Array
     expected: Array
@@ -325,6 +329,7 @@ def _loads_in_rows(
         is_inside=is_inside[judged],
         hub_weight={frame: matrix[judged] for frame, matrix in hub_weight.items()},
         time=time[judged],
+        states=states[judged],
         values=loads.values[: len(time)][judged],
         rounding=rounding[judged],
         expected=expected[judged],
@@ -410,6 +415,13 @@ def _explained(loads: JudgedLoads, wrong: Sequence[int]) -> tuple[str, ...]:
     tuple of str
         Causes in words; none where nothing fits.
     """
+    wrong = list(wrong)
+    of_scene = _other_scene(loads, wrong)
+    if of_scene:
+        return (of_scene,)
+    of_hub = _other_hub_mass(loads, wrong)
+    for j in of_hub:
+        wrong.remove(j)
     by_channel: dict[int, list[Explanation[Component]]] = {}
     unexplained: dict[tuple[str, str], list[int]] = {}  # moments by load and frame
     for j in wrong:
@@ -430,10 +442,114 @@ def _explained(loads: JudgedLoads, wrong: Sequence[int]) -> tuple[str, ...]:
         if text:
             named.setdefault(text, []).extend(loads.channels[j].name for j in group)
     exchanged = named.pop("", [])  # of another component, with nothing else wrong
+    for j, text in of_hub.items():
+        named.setdefault(text, []).append(loads.channels[j].name)
     likely = [f"{', '.join(names)}: {text}" for text, names in named.items()]
     if exchanged:
         likely.append(f"columns exchanged: {', '.join(exchanged)}")
     return tuple(likely)
+
+
+def _other_scene(loads: JudgedLoads, wrong: Sequence[int]) -> str:
+    """Search for another scene that explains all wrong components at the data's states.
+
+    It comes before mistakes of single components: without tilt, for example, a component may by
+    chance be that of another frame.
+
+    Parameters
+    ----------
+    loads : the rows that are judged.
+    wrong : numbers of the channels that are wrong.
+
+    Returns
+    -------
+    str
+        The cause, in words; "" where none explains all of them.
+    """
+    if not wrong:
+        return ""
+    some = slice(None, None, 1 + len(loads.time) // _FEW_ROWS)
+    screened = replace(
+        loads,
+        time=loads.time[some],
+        states=loads.states[some],
+        values=loads.values[some],
+        rounding=loads.rounding[some],
+        expected=loads.expected[some],
+        is_inside=loads.is_inside[some],
+    )
+    for text, other in other_scenes(loads.scene):
+        has_same_states = other.moving_coordinates == loads.scene.moving_coordinates
+        if other == loads.scene or not has_same_states:
+            continue
+        if _is_explained_by(screened, other, wrong) and _is_explained_by(loads, other, wrong):
+            return text
+    return ""
+
+
+def _is_explained_by(loads: JudgedLoads, other: Scene, wrong: Sequence[int]) -> bool:
+    """Return whether the data have the loads of another scene at their states.
+
+    Parameters
+    ----------
+    loads : the rows that are judged.
+    other : the scene, with the coordinates of the data.
+    wrong : numbers of the channels that are wrong, which it must explain; the others must stay
+        right.
+    """
+    right = _loads_of(loads, other)
+    for j in range(len(loads.channels)):
+        if j in wrong:
+            if not loads.left(j, Component(1.0, right[:, j]), may_vanish=True) <= 0.0:
+                return False
+            continue
+        error = np.abs(loads.values[:, j] - right[:, j]) - FLOOR_SAFETY * loads.rounding[:, j]
+        if not error.max() <= loads.tolerance * loads.scale(j, right[:, j]):
+            return False
+    return True
+
+
+def _loads_of(loads: JudgedLoads, other: Scene) -> Array:
+    """Return the loads of another scene at the data's states, (n, channels) N or N m."""
+    angles, rates = np.split(loads.states, 2, axis=1)
+    by_frame = loads_by_frame(other, loads.time, *all_coordinates(other, angles, rates))
+    columns = []
+    for channel in loads.channels:
+        columns.append(by_frame[channel.frame][:, channel.column - loads.known[0].column])
+    return np.stack(columns, axis=1)
+
+
+def _other_hub_mass(loads: JudgedLoads, wrong: Sequence[int]) -> dict[int, str]:
+    """Fit the mass of the hub, whose weight is in the forces on the shaft alone.
+
+    Parameters
+    ----------
+    loads : the rows that are judged.
+    wrong : numbers of the channels that are wrong.
+
+    Returns
+    -------
+    dict
+        The cause in words by the number of each force on the shaft that is wrong; empty where no
+        mass, or none at all, explains all of them.
+    """
+    scene = loads.scene
+    forces = [j for j in wrong if _load(loads.channels[j]) == "shaft force"]
+    if not forces or not scene.gravity:
+        return {}
+    heavier = _loads_of(loads, replace(scene, hub_mass=scene.hub_mass + 1.0))
+    per_kg = (heavier - _loads_of(loads, scene))[:, forces]
+    difference = (loads.values - loads.expected)[:, forces]
+    change = float((per_kg * difference).sum() / ((per_kg**2).sum() or 1.0))
+    mass = scene.hub_mass + change
+    # A hub without mass is called by its own name: the weight that was forgotten.
+    if mass <= MAX_LEFT * abs(change):
+        return {}
+    right = _loads_of(loads, replace(scene, hub_mass=mass))
+    if any(loads.left(j, Component(1.0, right[:, j]), may_vanish=True) > 0.0 for j in forces):
+        return {}
+    text = f"hub.mass {mass:.6g} kg in place of {scene.hub_mass:g} kg"
+    return dict.fromkeys(forces, text)
 
 
 def _component_hypotheses(loads: JudgedLoads, j: int) -> Iterator[Hypothesis[Component]]:
@@ -570,6 +686,13 @@ def _other_point(loads: JudgedLoads, load: str, frame: str, group: Sequence[int]
         # A coordinate that is within rounding is shown as 0.
         point[np.abs(point) < 1e-9 * np.abs(point).max()] = 0.0
         shown = ", ".join(f"{x:.6g}" for x in point)
+        radius = loads.scene.hub_radius + float(point[2])
+        is_on_axis = float(np.abs(point[:2]).max()) <= MAX_LEFT * abs(float(point[2]))
+        if is_root and frame in ("", "coned") and is_on_axis and radius > 0.0:
+            text = f"hub.radius {radius:.6g} m in place of {loads.scene.hub_radius:g} m"
+            text = ", ".join([text, *_mistakes(factor)])
+            points.append(Hypothesis(text, (factor, point)))
+            continue
         add(f"the point ({shown}) m of the {frame_name} frame", point, factor)
 
     def left_about(change: tuple[float, Array]) -> float:

@@ -168,7 +168,7 @@ MISTAKES: dict[str, tuple[Change, list[str]]] = {
     ),
     "at a hub radius": (
         about(lambda _: (0.0, 0.0, 1.5)),
-        ["about the point (0, 0, 1.5) m of the blade's own frame in place of"],
+        ["hub.radius 1.5 m in place of 0 m"],
     ),
     "tower top": (
         lambda _, d: {

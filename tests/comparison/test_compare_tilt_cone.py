@@ -201,6 +201,24 @@ def test_a_mistake_in_loads_is_named(fault: str) -> None:
     assert any(text in cause for cause in found.likely), found.likely
 
 
+def test_another_mass_of_the_hub_is_named_with_its_size() -> None:
+    change = [0.0, 0.0, 50.0 * SCENE.gravity]
+    loads = {load: stored(load) for load in LOADS} | {"shaft_force": stored("shaft_force") + change}
+    found = rm.compare(motion(SCENE) | loads, SCENE)
+    assert found.likely == ("shaft force z: hub.mass 250 kg in place of 200 kg",)
+
+
+def test_a_scene_that_explains_all_loads_comes_before_frames_of_some() -> None:
+    """Loads as a program without tilt computes them, at the states of the tilted rotor."""
+    right = motion(SCENE)
+    upright = replace(SCENE, shaft_tilt=0.0)
+    rows = zip(right["angles"], right["rates"], strict=True)
+    loads = [measure(upright, *row).loads for row in rows]
+    data = right | {load: np.array([each[load] for each in loads]) for load in LOADS}
+    found = rm.compare(data, SCENE)
+    assert found.likely == ("without the tilt of the shaft",)
+
+
 def test_the_torque_on_a_tilted_rotor_is_along_the_shaft() -> None:
     driven = replace(SCENE, rotor_torque=((0.0, 500.0),))
     run = Trajectory(*motion(SCENE).values())
