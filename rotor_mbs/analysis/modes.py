@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 import textwrap
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import partial
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -36,6 +36,7 @@ from rotor_mbs.analysis.whirl import (
 from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.runs.hdf5 import Column, reading
 from rotor_mbs.runs.read import Record, read_records
+from rotor_mbs.runs.trailer import MODES
 from rotor_mbs.solution.trajectory import Array
 
 Complex = NDArray[np.complex128]
@@ -791,114 +792,184 @@ def mode_summary(modes: SceneModes) -> str:
 
 # Records of a results file
 
-# By name: values, and what they are.
-Datasets: TypeAlias = Mapping[str, tuple[NDArray[Any], Column]]
-_SPEED = Column(("speed",), "rad/s", "rotor speed")
+_SCALES = {
+    "speed": Column(("speed",), "rad/s", "rotor speed"),
+    "mode": Column(("mode",), "1", "number of the mode"),
+    "coordinate": Column(("coordinate",), "1", "coordinate with inertia"),
+    "component": Column(("component",), "1", "rotor and multiblade coordinates"),
+    "equation": Column(
+        ("equation",), "1", "equation of motion, of the coordinate with the same number"
+    ),
+    "root": Column(("root",), "1", "number of the eigenvalue of a mode, 0 or 1"),
+    "motion": Column(("motion",), "1", "number of the motion in the fixed frame"),
+    "multiplier": Column(("multiplier",), "1", "number of the multiplier, the largest first"),
+}
+# What a group of a file has, declared once for writing and reading. By name of the array: what it
+# is in the object that is stored, see `_part`, and its description. Scales are numbers from 0,
+# but for the speeds.
+Declared: TypeAlias = Mapping[str, tuple[str, Column]]
+
+_mode = partial(Column, ("speed", "mode"))
+_root = partial(Column, ("speed", "mode", "root"))
+_place = partial(Column, ("speed", "mode", "coordinate"))
+_component = partial(Column, ("speed", "mode", "component"))
+_entry = partial(Column, ("speed", "equation", "coordinate"))
+_LINEAR: Declared = {
+    "steady_angle": (
+        "angles",
+        Column(("speed", "coordinate"), "rad", "angle at the steady state"),
+    ),
+    "undamped_frequency": (
+        "undamped_frequencies",
+        _mode("rad/s", "undamped frequency, in the rotor's frame"),
+    ),
+    "damped_frequency": (
+        "damped_frequencies",
+        _mode("rad/s", "damped frequency, in the rotor's frame"),
+    ),
+    "damping_ratio": ("damping_ratios", _mode("1", "damping ratio")),
+    "growth_rate": ("growth_rates", _mode("1/s", "largest real part of the mode's eigenvalues")),
+    "backward_whirl_frequency": (
+        "whirl.0",
+        _mode("rad/s", "damped frequency in the fixed frame, seen as a backward whirl"),
+    ),
+    "forward_whirl_frequency": (
+        "whirl.1",
+        _mode("rad/s", "damped frequency in the fixed frame, seen as a forward whirl"),
+    ),
+    "eigenvalue_real": ("eigenvalues.real", _root("1/s", "eigenvalue, real part")),
+    "eigenvalue_imag": ("eigenvalues.imag", _root("1/s", "eigenvalue, imaginary part")),
+    "shape_real": ("shapes.real", _place("1", "mode shape, real part, largest entry 1")),
+    "shape_imag": ("shapes.imag", _place("1", "mode shape, imaginary part")),
+    "multiblade_shape_real": (
+        "multiblade_shapes.real",
+        _component("1", "multiblade mode shape, real part"),
+    ),
+    "multiblade_shape_imag": (
+        "multiblade_shapes.imag",
+        _component("1", "multiblade mode shape, imaginary part"),
+    ),
+    "stiffness": ("stiffness", _entry("1/s^2", "inverse mass matrix times stiffness matrix")),
+    "damping": (
+        "damping",
+        _entry("1/s", "inverse mass matrix times damping and gyroscopic matrix"),
+    ),
+    "nodal_diameter": (
+        "nodal_diameters",
+        Column(("mode",), "1", "nodal diameters of the mode shape, -1: several", "<i8"),
+    ),
+}
+_motion = partial(Column, ("speed", "motion"))
+_FIXED_FRAME: Declared = {
+    "motion_diameter": (
+        "fixed_frame.diameters",
+        Column(("motion",), "1", "nodal diameters, below 0: backward whirl", "<i8"),
+    ),
+    "rotating_frame_frequency": (
+        "fixed_frame.rotating",
+        _motion("rad/s", "damped frequency of the motion in the rotating frame"),
+    ),
+    "fixed_frame_frequency": (
+        "fixed_frame.fixed",
+        _motion("rad/s", "damped frequency of the motion in the fixed frame"),
+    ),
+    "rotor_share": (
+        "fixed_frame.rotor_share",
+        _motion("1", "amplitude of the rotor's angle over the largest of the pitches"),
+    ),
+}
+_speed = partial(Column, ("speed",))
+_multiplier = partial(Column, ("speed", "multiplier"))
+_FLOQUET: Declared = {
+    "multiplier_real": ("multipliers.real", _multiplier("1", "Floquet multiplier, real part")),
+    "multiplier_imag": (
+        "multipliers.imag",
+        _multiplier("1", "Floquet multiplier, imaginary part"),
+    ),
+    "largest_multiplier": (
+        "largest",
+        _speed("1", "largest modulus, without multipliers that are always 1"),
+    ),
+    "growth_rate": (
+        "growth_rates",
+        _speed("1/s", "growth rate that follows from the largest multiplier"),
+    ),
+    "stable": (
+        "stable",
+        _speed("1", "1: no multiplier above 1, 0: a multiplier above 1, -1: unknown"),
+    ),
+    "product_error": (
+        "product_error",
+        _speed("1", "logarithm of the product of the multipliers minus the integrated trace"),
+    ),
+    "torque": ("torque", _speed("N m", "torque on the rotor that maintains its mean speed")),
+    "mismatch": ("mismatch", _speed("rad", "error of periodicity after a revolution")),
+}
 
 
-def _linear_datasets(linear: LinearModes) -> Datasets:
-    """Return the arrays of one source with their descriptions, as a results file has them.
+def _part(stored: LinearModes | FloquetTable, path: str) -> NDArray[Any]:
+    """Return an array of what is stored: "whirl.1" is `stored.whirl[1]`.
 
     Parameters
     ----------
-    linear : modes of one source and kind over speed.
+    stored : the modes or multipliers.
+    path : attributes and numbers of entries, joined by dots.
     """
-    mode, shape = partial(Column, ("speed", "mode")), linear.multiblade_shapes
-    component = Column(("component",), "1", "rotor and multiblade coordinates")
-    n, (backward, forward) = np.arange(len(linear.coordinates)), linear.whirl
-    frame = linear.fixed_frame
-    entry, part = (
-        partial(Column, ("speed", "equation", "coordinate")),
-        partial(Column, ("speed", "mode", "component")),
+    value: Any = stored
+    for name in path.split("."):
+        value = value[int(name)] if name.isdigit() else getattr(value, name)
+    return np.asarray(value)
+
+
+def _record(
+    scene: str,
+    name: str,
+    attributes: Mapping[str, Any],
+    stored: LinearModes | FloquetTable,
+    declared: Declared,
+) -> Record:
+    """Return the record of modes or multipliers, with the scales of all arrays first.
+
+    Parameters
+    ----------
+    scene, name : of the record.
+    attributes : further values of the record.
+    stored : what has the arrays.
+    declared : the arrays.
+    """
+    arrays: dict[str, NDArray[Any]] = {}
+    lengths: dict[str, int] = {}
+    for array, (path, column) in declared.items():
+        arrays[array] = _part(stored, path)
+        lengths |= zip(column.dimensions, arrays[array].shape, strict=True)
+    scales = {scale: np.arange(lengths[scale]) for scale in _SCALES if scale in lengths}
+    columns = {scale: _SCALES[scale] for scale in scales}
+    columns |= {array: column for array, (_, column) in declared.items()}
+    return Record(
+        MODES, scene, name, attributes, scales | {"speed": stored.speeds} | arrays, columns
     )
-    root, place = (
-        partial(Column, ("speed", "mode", "root")),
-        partial(Column, ("speed", "mode", "coordinate")),
-    )
-    datasets = {
-        "speed": (linear.speeds, _SPEED),
-        "mode": (n, Column(("mode",), "1", "number of the mode")),
-        "coordinate": (n, Column(("coordinate",), "1", "coordinate with inertia")),
-        "component": (np.arange(shape.shape[2]), component),
-        "equation": (
-            n,
-            Column(
-                ("equation",), "1", "equation of motion, of the coordinate with the same number"
-            ),
-        ),
-        "root": (
-            np.arange(2),
-            Column(("root",), "1", "number of the eigenvalue of a mode, 0 or 1"),
-        ),
-        "steady_angle": (
-            linear.angles,
-            Column(("speed", "coordinate"), "rad", "angle at the steady state"),
-        ),
-        "undamped_frequency": (
-            linear.undamped_frequencies,
-            mode("rad/s", "undamped frequency, in the rotor's frame"),
-        ),
-        "damped_frequency": (
-            linear.damped_frequencies,
-            mode("rad/s", "damped frequency, in the rotor's frame"),
-        ),
-        "damping_ratio": (linear.damping_ratios, mode("1", "damping ratio")),
-        "growth_rate": (
-            linear.growth_rates,
-            mode("1/s", "largest real part of the mode's eigenvalues"),
-        ),
-        "backward_whirl_frequency": (
-            backward,
-            mode("rad/s", "damped frequency in the fixed frame, seen as a backward whirl"),
-        ),
-        "forward_whirl_frequency": (
-            forward,
-            mode("rad/s", "damped frequency in the fixed frame, seen as a forward whirl"),
-        ),
-        "eigenvalue_real": (linear.eigenvalues.real, root("1/s", "eigenvalue, real part")),
-        "eigenvalue_imag": (linear.eigenvalues.imag, root("1/s", "eigenvalue, imaginary part")),
-        "shape_real": (linear.shapes.real, place("1", "mode shape, real part, largest entry 1")),
-        "shape_imag": (linear.shapes.imag, place("1", "mode shape, imaginary part")),
-        "multiblade_shape_real": (shape.real, part("1", "multiblade mode shape, real part")),
-        "multiblade_shape_imag": (shape.imag, part("1", "multiblade mode shape, imaginary part")),
-        "stiffness": (
-            linear.stiffness,
-            entry("1/s^2", "inverse mass matrix times stiffness matrix"),
-        ),
-        "damping": (
-            linear.damping,
-            entry("1/s", "inverse mass matrix times damping and gyroscopic matrix"),
-        ),
-        "nodal_diameter": (
-            linear.nodal_diameters,
-            Column(("mode",), "1", "nodal diameters of the mode shape, -1: several", "<i8"),
-        ),
-    }
-    if linear.kind == ROTATION and isinstance(frame, FixedFrame):
-        motion = partial(Column, ("speed", "motion"))
-        datasets |= {
-            "motion": (
-                np.arange(len(frame.names)),
-                Column(("motion",), "1", "number of the motion in the fixed frame"),
-            ),
-            "motion_diameter": (
-                frame.diameters,
-                Column(("motion",), "1", "nodal diameters, below 0: backward whirl", "<i8"),
-            ),
-            "rotating_frame_frequency": (
-                frame.rotating,
-                motion("rad/s", "damped frequency of the motion in the rotating frame"),
-            ),
-            "fixed_frame_frequency": (
-                frame.fixed,
-                motion("rad/s", "damped frequency of the motion in the fixed frame"),
-            ),
-            "rotor_share": (
-                frame.rotor_share,
-                motion("1", "amplitude of the rotor's angle over the largest of the pitches"),
-            ),
-        }
-    return datasets
+
+
+def _stored_fields(
+    cls: type[LinearModes] | type[FloquetTable],
+    arrays: Mapping[str, NDArray[Any]],
+    declared: Declared,
+) -> dict[str, Any]:
+    """Return the arrays that are fields of a class, by field, from those of a record.
+
+    Parameters
+    ----------
+    cls : of what was stored; its other arrays follow from its fields.
+    arrays : of the record.
+    declared : the same as for writing.
+    """
+    names = {field.name for field in fields(cls)}
+    values: dict[str, Any] = {"speeds": arrays["speed"]}
+    for array, (path, _) in declared.items():
+        name, _, part = path.partition(".")
+        if name in names:
+            values[name] = values[name] + 1j * arrays[array] if part == "imag" else arrays[array]
+    return values
 
 
 def to_records(modes: SceneModes) -> list[Record]:
@@ -913,54 +984,9 @@ def to_records(modes: SceneModes) -> list[Record]:
     linear = [*modes.rest.values(), *modes.rotation.values()]
     records = [_linear_record(modes.scene, source, common) for source in linear]
     if modes.floquet is not None:
-        table = modes.floquet
-        at, each = partial(Column, ("speed",)), partial(Column, ("speed", "multiplier"))
-        count = Column(("multiplier",), "1", "number of the multiplier, the largest first")
-        floquet = {
-            "speed": (table.speeds, _SPEED),
-            "multiplier": (np.arange(table.multipliers.shape[1]), count),
-            "multiplier_real": (table.multipliers.real, each("1", "Floquet multiplier, real part")),
-            "multiplier_imag": (
-                table.multipliers.imag,
-                each("1", "Floquet multiplier, imaginary part"),
-            ),
-            "largest_multiplier": (
-                table.largest,
-                at("1", "largest modulus, without multipliers that are always 1"),
-            ),
-            "growth_rate": (
-                table.growth_rates,
-                at("1/s", "growth rate that follows from the largest multiplier"),
-            ),
-            "stable": (
-                table.stable,
-                at("1", "1: no multiplier above 1, 0: a multiplier above 1, -1: unknown"),
-            ),
-            "product_error": (
-                table.product_error,
-                at("1", "logarithm of the product of the multipliers minus the integrated trace"),
-            ),
-            "torque": (
-                table.torque,
-                at("N m", "torque on the rotor that maintains its mean speed"),
-            ),
-            "mismatch": (table.mismatch, at("rad", "error of periodicity after a revolution")),
-        }
-        facts = {**common, "messages": list(table.messages)}
-        records.append(_record(modes.scene, FLOQUET, facts, floquet))
+        facts = {**common, "messages": list(modes.floquet.messages)}
+        records.append(_record(modes.scene, FLOQUET, facts, modes.floquet, _FLOQUET))
     return records
-
-
-def _record(scene: str, name: str, attributes: Mapping[str, Any], datasets: Datasets) -> Record:
-    arrays = {dataset: values for dataset, (values, _) in datasets.items()}
-    return Record(
-        "modes",
-        scene,
-        name,
-        attributes,
-        arrays,
-        {dataset: what for dataset, (_, what) in datasets.items()},
-    )
 
 
 def _linear_record(scene: str, linear: LinearModes, common: Mapping[str, Any]) -> Record:
@@ -983,9 +1009,11 @@ def _linear_record(scene: str, linear: LinearModes, common: Mapping[str, Any]) -
         "messages": list(linear.messages),
         "weights": linear.weights,
     }
+    declared = _LINEAR
     if linear.kind == ROTATION and isinstance(frame, FixedFrame):
         attributes["motion_labels"] = list(frame.names)
-    return _record(scene, f"{linear.source}/{linear.kind}", attributes, _linear_datasets(linear))
+        declared = {**_LINEAR, **_FIXED_FRAME}
+    return _record(scene, f"{linear.source}/{linear.kind}", attributes, linear, declared)
 
 
 def linear_dataset(sources: Mapping[str, LinearModes], xarray: Any) -> Any:
@@ -1057,33 +1085,18 @@ def _modes_of(of_all: Sequence[Record]) -> dict[str, SceneModes]:
             source, _, kind = name.partition("/")
             if name == FLOQUET:
                 floquet = FloquetTable(
-                    speeds=arrays["speed"],
-                    multipliers=np.asarray(
-                        arrays["multiplier_real"] + 1j * arrays["multiplier_imag"]
-                    ),
-                    largest=arrays["largest_multiplier"],
+                    **_stored_fields(FloquetTable, arrays, _FLOQUET),
                     messages=tuple(map(str, facts["messages"])),
-                    **{
-                        column: arrays[column]
-                        for column in ("stable", "product_error", "torque", "mismatch")
-                    },
                 )
             elif kind in states:
                 states[kind][source] = LinearModes(
-                    eigenvalues=np.asarray(
-                        arrays["eigenvalue_real"] + 1j * arrays["eigenvalue_imag"]
-                    ),
-                    shapes=np.asarray(arrays["shape_real"] + 1j * arrays["shape_imag"]),
+                    **_stored_fields(LinearModes, arrays, _LINEAR),
                     names=tuple(map(str, facts["mode_labels"])),
                     source=source,
                     label=str(facts["label"]),
                     kind=kind,
                     blades=int(facts["blades"]),
-                    speeds=arrays["speed"],
                     coordinates=tuple(map(str, facts["coordinate_labels"])),
-                    angles=arrays["steady_angle"],
-                    stiffness=arrays["stiffness"],
-                    damping=arrays["damping"],
                     weights=float(facts.get("weights", 0.0)),
                     messages=tuple(map(str, facts["messages"])),
                 )
