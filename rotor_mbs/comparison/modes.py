@@ -10,6 +10,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from rotor_mbs.analysis.modes import CLOSED_FORM, LinearModes
+from rotor_mbs.analysis.whirl import whirl_frequencies
 from rotor_mbs.comparison.data import ForeignData
 from rotor_mbs.comparison.hypotheses import Hypothesis, cheapest, explanations
 from rotor_mbs.comparison.loads import LEFT_SHARE, MAX_LEFT
@@ -184,7 +185,7 @@ def _families(modes: LinearModes, data: ForeignData) -> dict[str, Array]:
         By name of the family, "" for the right one, (speeds, frequencies) rad/s.
     """
     damped, undamped = modes.damped_frequencies, modes.undamped_frequencies
-    speed = modes.speeds[:, None]
+    speed = np.abs(modes.speeds[:, None])
     if data.channels[0].name.startswith("undamped"):
         right, other, other_name = undamped, damped, "damped frequencies"
     else:
@@ -193,7 +194,11 @@ def _families(modes: LinearModes, data: ForeignData) -> dict[str, Array]:
         "frequencies in the fixed frame (whirl), the rotor's speed below or above those in the "
         "rotor's frame"
     )
-    in_fixed_frame = np.concatenate([right, np.abs(right - speed), right + speed], axis=1)
+    in_fixed_frame = right
+    # Of five blades and more some waves have two nodal diameters and more.
+    for diameters in range(1, max(2, (modes.blades + 1) // 2)):
+        whirling = whirl_frequencies(right, speed, diameters)
+        in_fixed_frame = np.concatenate([in_fixed_frame, *whirling], axis=1)
     return {"": right, other_name: other, whirl: in_fixed_frame}
 
 

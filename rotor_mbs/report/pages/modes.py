@@ -98,7 +98,12 @@ class ModePlots:
                 look = mode_look(k, name)
                 curve(axes, rpm, values[:, k], look, markevery=every, markersize=4.0)
         panel.axes[-1].set_ylabel("change (Hz)")
-        return panel.with_legend()
+        panel.with_legend()
+        # The margin of the legend is a share of the height, of which this figure has more.
+        lines = math.ceil(len(motions.names) / 2)
+        height = float(panel.figure.get_figheight())
+        panel.figure.subplots_adjust(top=1.0 - (0.15 + 0.24 * lines) / height)
+        return panel
 
     def damping(self) -> Panels:
         """Plot damping ratios and growth rates (1/s) over rotor speed (rpm).
@@ -216,7 +221,7 @@ def _draw_harmonics(axes: Any, modes: LinearModes, top: float) -> None:
     for k in multiples:
         axes.plot(modes.speeds * RPM, k * revolutions, color=GREY, linewidth=0.7, linestyle=":")
         if fastest > 0.0 and (is_apart or k == multiples[-1]):
-            end = min(fastest, top / k)
+            end = min(fastest, 0.8 * top / k)  # below the legend and the highest curve
             place = math.copysign(end, modes.speeds[-1]) / HERTZ * RPM
             axes.text(place, k * end, f"{k}P", color=GREY, ha="right", va="bottom", fontsize=8.0)
 
@@ -638,7 +643,7 @@ def _multipliers(table: FloquetTable) -> PageTable:
         )
     head = (
         "Speed (rpm)",
-        "(rad/s)",
+        "speed (rad/s)",
         "largest multiplier",
         "growth rate (1/s)",
         "product minus trace",
@@ -698,7 +703,7 @@ def _over_speed(rotation: LinearModes) -> Fold:
         for speed, values in zip(rotation.speeds.tolist(), frequencies * HERTZ, strict=True):
             cells = [_shown(value, 6) for value in values.tolist()]
             rows.append([number(speed * RPM, 4), number(speed, 4), *cells])
-        tables.append(PageTable(title, ("Speed (rpm)", "(rad/s)", *names), rows))
+        tables.append(PageTable(title, ("Speed (rpm)", "speed (rad/s)", *names), rows))
     elements: list[Element] = []
     for table in tables:
         elements += [Note(table.caption), table]
