@@ -859,6 +859,8 @@ _LINEAR: Declared = {
         Column(("mode",), "1", "nodal diameters of the mode shape, -1: several", "<i8"),
     ),
 }
+# What numbers of modes are, by name.
+MODE_COLUMNS = {"speed": _SCALES["speed"]} | {name: column for name, (_, column) in _LINEAR.items()}
 _motion = partial(Column, ("speed", "motion"))
 _FIXED_FRAME: Declared = {
     "motion_diameter": (

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotor_mbs.analysis.modes import (
+    MODE_COLUMNS,
     SceneModes,
     campbell_table,
     linear_dataset,
@@ -20,6 +21,7 @@ from rotor_mbs.analysis.modes import (
     to_records,
 )
 from rotor_mbs.analysis.text_tables import TextTable
+from rotor_mbs.api.tables import data_frame
 from rotor_mbs.errors import InputError, shown_value
 from rotor_mbs.runs.read import write_records
 from rotor_mbs.runs.versions import machine, versions
@@ -104,13 +106,16 @@ class Modes(SceneModes):
 
         return ModePlots(self)
 
-    def table(self) -> TextTable:
-        """Return a table with a row per state, speed and mode of the closed form.
+    def table(self) -> Any:
+        """Return a pandas DataFrame with a row per state, speed and mode of the closed form.
 
-        Frequencies are in rad/s (damped ones also in Hz) in the rotating frame, decay rates in
-        1/s; damping ratios have no unit. See `campbell` for Hz over rpm, and the fixed frame.
+        Frequencies are in rad/s, decay rates in 1/s; damping ratios have no unit. The whirl's are
+        those in the fixed frame, all others in the rotating frame; `table.attrs["growth_rate"]` are
+        the attributes of a column. See `campbell` for Hz over rpm.
         """
-        return mode_table(mode_rows(self))
+        rows = mode_rows(self)
+        names = list(rows[0]) if rows else []
+        return data_frame({name: [row[name] for row in rows] for name in names}, MODE_COLUMNS)
 
     def campbell(self) -> TextTable:
         """Return frequencies in Hz over the rotor speed in rpm, by the closed form.
@@ -167,7 +172,6 @@ class Modes(SceneModes):
         return mode_summary(self)
 
     def _repr_html_(self) -> str:
+        heading = f"<p>{escape(self.label)}: {escape(self.title)}</p>"
         drawn = self.plot()._repr_svg_() if self.rotation else ""
-        return (
-            f"<p>{escape(self.label)}: {escape(self.title)}</p>{self.table()._repr_html_()}{drawn}"
-        )
+        return f"{heading}{mode_table(mode_rows(self))._repr_html_()}{drawn}"

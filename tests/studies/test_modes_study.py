@@ -408,7 +408,12 @@ def test_a_span_that_means_nothing_is_bad_usage(span):
 
 
 def test_the_api_has_tables_figures_files(found, tmp_path):
-    assert str(found.table()).count("collective pitch") == 4  # at rest, and at three speeds
+    table = found.table()
+    assert (table["mode"] == "collective pitch").sum() == 4  # at rest, and at three speeds
+    damped = found.rotation["lagrange"].damped_frequencies
+    is_steady = table.state.str.startswith("steady")
+    np.testing.assert_array_equal(table.damped_frequency[is_steady], damped.ravel())
+    assert table.attrs["damped_frequency"]["units"] == table.attrs["speed"]["units"] == "rad/s"
     assert "<svg" in found._repr_html_()
     found.plot().save(tmp_path / "campbell.png")
     assert (tmp_path / "campbell.png").stat().st_size > 10_000
