@@ -22,6 +22,7 @@ from rotor_mbs.errors import InputError, MethodRefusal, nearest, shown_value
 from rotor_mbs.methods.base import Ladder, Method
 from rotor_mbs.methods.method_file import ENDING, MethodFile, located, quiet, read_file
 from rotor_mbs.methods.selection import recommend
+from rotor_mbs.methods.settings import unknown_setting
 from rotor_mbs.scenario.toml_file import KeyProblem, file_path
 
 if TYPE_CHECKING:  # `rotor-mbs list` reads no scene
@@ -389,7 +390,7 @@ def settings_for(names: Sequence[str], given: Mapping[str, object]) -> dict[str,
         allowed = f"{', '.join(known) or 'none'} ({', '.join(names)})"
         problems = []
         for setting in unknown:
-            problems.append(f"no setting {setting!r}{nearest(setting, known)}; allowed: {allowed}")
+            problems.append(f"{unknown_setting(setting, known)}; allowed: {allowed}")
         raise InputError(problems)
     by_method = {}
     for name, settings in declared.items():

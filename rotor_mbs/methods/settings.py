@@ -6,7 +6,7 @@ What a value may be is a `Kind` of `scenario.keys`, as for the keys of a scene f
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields
 from typing import Any, Self
 
@@ -67,6 +67,14 @@ def _declaration(kind: Kind, unit: str, doc: str) -> dict[str, Any]:
 _UNDECLARED = _declaration(keys.PYTHON_NUMBER, "", "")
 
 
+def unknown_setting(name: str, known: Iterable[str]) -> str:
+    """Return the line for a setting that no method has; a key of a scene has a point in it."""
+    line = f"no setting {name!r}{nearest(name, known)}"
+    if "." in name:
+        line += " (a key of scenes? rotor-mbs new FILE --from SCENE copies one, to be edited)"
+    return line
+
+
 @dataclass(frozen=True)
 class Settings:
     """Base class of the settings of a method, and the class for methods without settings.
@@ -100,7 +108,7 @@ class Settings:
         problems = []
         for name, value in given.items():
             if name not in declared:
-                problems.append(f"no setting {name!r}{nearest(name, declared)}")
+                problems.append(unknown_setting(name, declared))
                 continue
             try:
                 values[name] = declared[name]["kind"].read(value)

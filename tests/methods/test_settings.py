@@ -39,6 +39,7 @@ def refused(method: Method, **given: object) -> str:
 @pytest.mark.parametrize("method", ALL, ids=lambda method: method.name)
 def test_an_unknown_setting_is_refused_with_the_list_of_settings(method: Method) -> None:
     assert "no setting 'tolerence'" in refused(method, tolerence=1e-3)
+    assert "rotor-mbs new FILE --from SCENE" in refused(method, **{"blade.mass": 1e4})
     assert "relative_tolerance" in refused(method, relative_tolerance=-1)
 
 
