@@ -16,6 +16,7 @@ import pytest
 from numpy.typing import NDArray
 
 import rotor_mbs as rm
+from rotor_mbs.methods.catalogue import default_method
 
 HERE = Path(__file__).parents[1] / "support" / "uae_test10"
 GAGE = 0.3  # m from the apex, ShftGagL
@@ -69,7 +70,7 @@ def loads_of_scene(model: Path, time: Array, method: str) -> dict[str, Array]:
     return loads
 
 
-def excess(model: Path, method: str = "lagrange/taylor") -> dict[str, float]:
+def excess(model: Path, method: str = default_method()) -> dict[str, float]:
     """Largest difference from the published loads, in units of what their digits and rounding
     allow."""
     output = published()
