@@ -190,6 +190,16 @@ def _is_interrupt(error: BaseException) -> bool:
     return bool(_received_signals)
 
 
+def _signal_main_thread(number: signal.Signals) -> None:
+    """Send a signal to the main thread, and break off its system call, such as a sleep."""
+    if hasattr(signal, "pthread_kill"):
+        main = threading.main_thread().ident
+        assert main is not None  # it has started
+        signal.pthread_kill(main, number)
+    else:  # Windows; what the main thread waits for goes on
+        _thread.interrupt_main(number)
+
+
 @contextmanager
 def _signals_as_interrupts() -> Iterator[None]:
     """Raise KeyboardInterrupt in the block on SIGTERM and SIGHUP, as on Ctrl-C.
@@ -210,7 +220,8 @@ def _signals_as_interrupts() -> Iterator[None]:
         Python ignores exceptions in a weak reference's callback, for example.
         """
         if isinstance(unraisable.exc_value, KeyboardInterrupt):
-            threading.Timer(0.01, _thread.interrupt_main).start()
+            number = signal.Signals((_received_signals or [signal.SIGINT])[-1])
+            threading.Timer(0.01, _signal_main_thread, [number]).start()
         else:
             hook(unraisable)
 
