@@ -102,3 +102,9 @@ def test_no_reason_is_right_by_accident() -> None:
     assert is_right(BROKEN["p01_gravity_axis"], f"{NOT_FOUND}; the run raised an error") is None
     assert is_right(BROKEN["p01_gravity_axis"], "gravity of 9.8 m/s^2") is False
     assert is_right(BROKEN["p16_gravity_9_8"], "gravity of 9.8 m/s^2") is True
+
+
+def test_every_mistake_is_made_in_the_text_of_its_engine() -> None:
+    """An engine whose text was formatted anew would else be found missing in the long form alone."""
+    for name, engine in (BROKEN | RIGHT).items():
+        compile(engine.source(), name, "exec")

@@ -350,7 +350,10 @@ ROWS = {
     ),
     "r09_work_without_dampers": Engine(
         "work without the dampers",
-        [("- self.D * w**2 + np.sum(torque * v - self.d * v**2)", "+ np.sum(torque * v)")],
+        [
+            ("            - self.D * w**2\n", ""),
+            ("+ np.sum(torque * v - self.d * v**2)", "+ np.sum(torque * v)"),
+        ],
         "the work of loads, commands or dampers is wrong",
     ),
     "r10_potential_sign": Engine(
