@@ -93,6 +93,7 @@ print(sorted({"matplotlib", "jinja2", "pandas", "xarray"} & set(sys.modules)))
     assert ended.stdout == "[]\n", ended.stderr
 
 
+@pytest.mark.full
 def test_curves_without_a_file_live_as_long_as_the_object(scene: rm.Scene, tmp_path: Path) -> None:
     curves = rm.bench(scene, "exudyn_tree/rk44", repeats=1, budget=0.5, progress=False)
     assert curves.path.is_file()

@@ -51,7 +51,12 @@ def in_environment(variables: dict[str, str], *words: object) -> subprocess.Comp
         ({"PYTHONINSPECT": "1"}, ("list",), 0),
         ({"PYTHONINSPECT": "1"}, ("list", "--help"), 0),
         ({"PYTHONINSPECT": "1"}, ("show", "no/scene"), 2),
-        (BROKEN, ("figures", "FILE", "--figure", "8", "-o", "figures"), 0),
+        pytest.param(
+            BROKEN,
+            ("figures", "FILE", "--figure", "8", "-o", "figures"),
+            0,
+            marks=pytest.mark.full,
+        ),
         pytest.param(BROKEN, ("check", "FILE"), 0, marks=pytest.mark.full),
         pytest.param(BROKEN, ("report", "FILE", "-o", "pages"), 0, marks=pytest.mark.full),
         pytest.param(

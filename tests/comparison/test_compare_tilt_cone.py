@@ -87,6 +87,7 @@ LOADS = (
 )
 
 
+@pytest.mark.full
 def test_right_data_are_ok_with_loads_in_every_frame() -> None:
     data = motion(SCENE) | {load: stored(load) for load in LOADS}
     found = rm.compare(data, SCENE, tolerance=1e-9)

@@ -21,8 +21,12 @@ WRONG = 1.05  # factor of angles and rates of the first pitch
 
 @pytest.mark.parametrize(
     "seeds",
-    [range(25), pytest.param(range(25, 2025), marks=pytest.mark.nightly, id="2000")],
-    ids=["25", None],
+    [
+        range(8),
+        pytest.param(range(25), marks=pytest.mark.full),
+        pytest.param(range(25, 2025), marks=pytest.mark.nightly),
+    ],
+    ids=["8", "25", "2000"],
 )
 def test_the_same_numbers_have_the_same_verdict(
     seeds: range, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -268,6 +268,7 @@ def test_a_limit_that_ends_at_any_line_leaves_nothing() -> None:
     assert lines > 30
 
 
+@pytest.mark.full
 def test_an_alarm_of_the_caller_at_any_line_comes_once() -> None:
     """And its exception arrives, at the latest just after the block."""
     arrived: list[int] = []
@@ -490,6 +491,7 @@ def _spoilt(seed: int, calls: int) -> list[tuple[int, float]]:
     return spoilt
 
 
+@pytest.mark.full
 def test_after_random_calls_with_random_limits_a_call_gives_the_same_bits() -> None:
     assert not _spoilt(seed=1, calls=25)
 

@@ -97,6 +97,7 @@ def test_the_plots_of_a_figure_have_every_sample(results: Path, report: Path) ->
 # As files
 
 
+@pytest.mark.full
 def test_every_figure_the_file_has_is_written(drawn: Path, tmp_path: Path) -> None:
     ended = rotor_mbs("figures", drawn, "-o", tmp_path, "--format", "svg")
     assert ended.status == 0
@@ -115,7 +116,11 @@ def test_every_figure_the_file_has_is_written(drawn: Path, tmp_path: Path) -> No
 
 @pytest.mark.parametrize(
     ("kind", "start"),
-    [("pdf", b"%PDF"), pytest.param("png", b"\x89PNG", marks=pytest.mark.full), ("svg", b"<?xml")],
+    [
+        pytest.param("pdf", b"%PDF", marks=pytest.mark.full),
+        pytest.param("png", b"\x89PNG", marks=pytest.mark.full),
+        ("svg", b"<?xml"),
+    ],
 )
 def test_formats_have_the_same_bytes_every_time_and_say_what_they_show(
     drawn: Path, tmp_path: Path, kind: str, start: bytes

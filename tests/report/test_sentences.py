@@ -276,6 +276,7 @@ def test_a_comparison_names_the_onset_of_a_fault_and_crosses_only_what_differs(
     assert f"within the tolerance: {', '.join(checked)}." in answer_of(text)
 
 
+@pytest.mark.full
 def test_what_stays_at_the_reference_is_not_crossed(tmp_path: Path) -> None:
     """Pitch 1 of Fig. 11 drifts away from 4 s on: the defects of all coordinates are large, their
     errors are not."""

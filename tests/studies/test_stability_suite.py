@@ -111,6 +111,7 @@ def test_runs_are_counted_by_folder() -> None:
     assert {*STATUSES} - {"left_out", "worker_died"} <= {*OUTCOMES}
 
 
+@pytest.mark.full
 def test_an_interrupted_suite_goes_on_where_it_stopped(tmp_path: Path) -> None:
     """Each row is stored when it is computed; what is there is not computed again."""
     path, name = tmp_path / "s.h5", "extreme/light-1e-2"
