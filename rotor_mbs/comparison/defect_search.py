@@ -40,6 +40,7 @@ _QUICK = 3e-5  # relative error of a change of the model by quick steps
 # and the number of steps that limits the factor, so that a search does not take minutes.
 _MOST_FINE, _FINE_STEPS = 8, 32
 _PERHAPS = 0.2  # largest share of the defects that a model may leave by coarse steps
+_OF_RESCALED = 0.3  # times what a model leaves that is left by another multiple of its effect
 _LEFT_OF_SETS = 0.1  # share left by the projections on several parameters, before they are fitted
 _FAR_BETTER = 0.1  # times what a cheaper explanation leaves
 _SIGNIFICANT = 8.0  # standard deviations of an estimate
@@ -126,7 +127,9 @@ class DefectSearch:
         is_rounding = self._is_rounding
         explained: list[Explanation[RotorModel]] = []
         if not is_rounding:
-            explained = list(explanations(self._plausible_models(), self._left_by))
+            for explanation in explanations(self._plausible_models(), self._left_by):
+                if not self._has_other_size(explanation):
+                    explained.append(explanation)
         # A named mistake is preferred to fitted parameters, unless these explain far more.
         least = _least(explained)
         if least > 10.0 * _QUICK:
@@ -258,6 +261,22 @@ class DefectSearch:
         if not self._is_rounding and not self._largest_left(residual) <= allowed:
             return math.inf
         return self._share(residual)
+
+    def _has_other_size(self, explanation: Explanation[RotorModel]) -> bool:
+        """Return whether a multiple of a model's effect explains the defects far better than it.
+
+        Then the data have a mistake of this kind but of another size: a hub whose inertia is too
+        small is not one without inertia. What another program's own error leaves has no such
+        multiple.
+        """
+        if explanation.left <= 10.0 * _QUICK:
+            return False
+        residual = self._residual(explanation.hypothesis.change, self._fine)
+        left = (residual * self._weights).ravel()
+        effect = left - (self._values * self._weights).ravel()
+        multiple = float(left @ effect) / (float(effect @ effect) or 1.0)
+        rescaled = float(np.linalg.norm(left - multiple * effect))
+        return rescaled < _OF_RESCALED * float(np.linalg.norm(left))
 
     # Parameters
 

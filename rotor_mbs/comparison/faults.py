@@ -78,7 +78,8 @@ def faults_in_time(judged: JudgedDefects) -> list[str]:
             return []
     # The faults have to explain all: the defects of the other intervals are to be nearly zero.
     others = np.delete(excess, wrong)
-    if float(np.quantile(others, _MOST)) > max(judged.tolerance, _OF_OTHERS * judged.largest):
+    of_others = float(np.quantile(others, _MOST))
+    if of_others > max(judged.tolerance, _OF_OTHERS * judged.largest):
         return []
     groups = np.split(wrong, np.flatnonzero(np.diff(wrong) > _GAP) + 1)
     # A filter, or differences in place of rates, makes errors in all rows, the largest at the ends:
@@ -89,6 +90,10 @@ def faults_in_time(judged: JudgedDefects) -> list[str]:
     texts = []
     for group in groups[:_MAX_NAMED]:
         texts += _faults_of(judged, group)
+    # A period without a pattern is no cause where the other intervals have errors, too, though
+    # within the tolerance: those of an integrator are larger while the motion is fast.
+    if of_others > _OF_OTHERS * judged.largest:
+        texts = [text for text in texts if not text.startswith(UNKNOWN_FAULT)]
     if len(groups) > _MAX_NAMED:
         end = float(judged.defects.time[groups[-1][-1] + 1])
         texts.append(f"and {len(groups) - _MAX_NAMED} more faults until t = {end:.6g} s")

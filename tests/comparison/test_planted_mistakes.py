@@ -471,6 +471,33 @@ def test_a_true_run_with_the_noise_of_rounding_is_ok(scene: str) -> None:
     assert (comparison.status, comparison.likely) == ("ok", ())
 
 
+def test_a_hub_that_is_too_light_is_not_named_as_a_missing_one() -> None:
+    """A mistake of the same kind but another size leaves less than the tolerance, and a multiple
+    of the missing hub's effect explains it."""
+
+    def light(scene: Scene) -> Scene:
+        return replace(scene, hub_inertia=0.03 * scene.hub_inertia)
+
+    data = Plant("", "check/general", changed=light).data()
+    comparison = rm.compare(data, short("check/general"), tolerance=1e-5)
+    assert comparison.status == "inaccurate"
+    assert not any("without" in text for text in comparison.likely), comparison.likely
+
+
+def faster_at_first(time: Array, q: Array, w: Array) -> tuple[Array, Array, Array]:
+    """Errors of every interval, which are large up to 0.6 s and within the tolerance later."""
+    sizes = np.where(time < 0.6, 2e-5, 3e-7)
+    q[:, 1] += sizes * (-1.0) ** np.arange(len(time))
+    return time, q, w
+
+
+def test_errors_that_become_smaller_are_no_fault_at_a_time() -> None:
+    data = Plant("", spoilt=faster_at_first).data()
+    comparison = rm.compare(data, short("paper/fig11"))
+    assert comparison.status == "inaccurate"
+    assert not any("a fault" in text for text in comparison.likely), comparison.likely
+
+
 def averaged(time: Array, *arrays: Array) -> tuple[Array, Array, Array]:
     """A filter leaves the first and the last two rows as they were: the largest defects are
     there."""
