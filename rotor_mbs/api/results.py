@@ -242,7 +242,7 @@ class Results(Mapping[Any, Any]):
         """Return the number of stored runs with each status."""
         self._stored.verify()
         with reading(self.path):
-            return dict(Counter(self._values("status")))
+            return dict(Counter(map(str, self._values("status"))))
 
     def table(self) -> Any:
         """Return a pandas DataFrame with a row per run, by label.
