@@ -429,7 +429,7 @@ def test_the_callers_alarm_passes_through_a_call(name: str) -> None:
 
 @pytest.mark.full
 def test_the_callers_alarm_passes_through_the_examination_of_a_method() -> None:
-    alarmed(lambda: examine("exudyn_tree/rk67"), 2.0)
+    alarmed(lambda: examine("exudyn_tree/rk67"), 0.5)
 
 
 def test_a_limit_that_ends_while_it_is_set_spoils_no_later_call() -> None:
