@@ -442,6 +442,10 @@ def other_scenes(scene: Scene) -> Iterator[tuple[str, Scene]]:
         yield f"gravity of {gravity:g} m/s^2", replace(scene, gravity=gravity)
     yield from _other_blades(scene)
     yield "tilt of the shaft with opposite sign", replace(scene, shaft_tilt=-scene.shaft_tilt)
+    if scene.shaft_tilt and any(blade.cone for blade in scene.blades):
+        upright = tuple(replace(blade, cone=0.0) for blade in scene.blades)
+        text = "without the tilt of the shaft and the cone of the blades"
+        yield text, replace(scene, shaft_tilt=0.0, blades=upright)
     yield from _exchanged_bearings(scene)
     for (field, text), (amount, factor) in itertools.product(_FORGOTTEN.items(), _FACTORS.items()):
         # A scene has no negative stiffness, damping or inertia, and no motion lasts with it.

@@ -126,6 +126,10 @@ MOTIONS: dict[str, tuple[Callable[[Scene], Scene], str]] = {
         "tilt of the shaft with opposite sign",
     ),
     "no cone": (lambda scene: with_cone(scene, 0.0), "without the cone of the blades"),
+    "neither": (
+        lambda scene: with_cone(replace(scene, shaft_tilt=0.0), 0.0),
+        "without the tilt of the shaft and the cone of the blades",
+    ),
     "cone": (
         lambda scene: with_cone(scene, math.radians(3.0)),
         "cone of the blades with opposite sign",
