@@ -192,6 +192,8 @@ def _is_interrupt(error: BaseException) -> bool:
 
 def _signal_main_thread(number: signal.Signals) -> None:
     """Send a signal to the main thread, and break off its system call, such as a sleep."""
+    if not callable(signal.getsignal(number)):
+        return  # the command has ended meanwhile: by default the signal would end its caller
     if hasattr(signal, "pthread_kill"):
         main = threading.main_thread().ident
         assert main is not None  # it has started
