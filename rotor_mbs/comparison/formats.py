@@ -791,6 +791,13 @@ def _first_row(source: str, lines: Lines) -> tuple[int, str | None]:
             fields = _fields(line, divider)
             numbers, others = _kinds_of_fields(fields, divider)
             if len(fields) > 1 and numbers and not others:
+                # A row before it may have a text in place of a number: no header then, if it
+                # begins with a number, as a time is.
+                with_texts = _first_row_with_texts(lines[: place + 1])
+                if with_texts is not None:
+                    first = _fields(lines[with_texts[0]][1], with_texts[1])[0]
+                    if _is_number(first, decimal_comma=with_texts[1] != ","):
+                        return with_texts
                 return place, divider
             if others and numbers > most_numbers:
                 most_numbers = numbers

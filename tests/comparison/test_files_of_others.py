@@ -427,6 +427,11 @@ NOT_NUMBERS: dict[str, tuple[str, Callable[[Path], Any], str]] = {
         lambda path: write_csv(path, {**TABLE, "pitch 3 rate": ["*****", *TIME[1:]]}),
         "column 'pitch 3 rate': row 1 (line 2) has '*****', no number",
     ),
+    "a text in the first row": (
+        "data.csv",
+        lambda path: write_csv(path, {**TABLE, "rotor": ["abc", *TIME[1:]]}),
+        "column 'rotor': row 1 (line 2) has 'abc', no number",
+    ),
     "NA": (
         "data.csv",
         lambda path: write_csv(path, {**TABLE, "rotor": ["NA", *TIME[1:]]}),
