@@ -8,13 +8,9 @@ from typing import TYPE_CHECKING, overload
 
 from rotor_mbs.api.results import Results, Run, TemporaryFolder
 from rotor_mbs.errors import InputError, MethodRefusal, ResourceError, shown_value
-from rotor_mbs.methods.catalogue import (
-    check_names,
-    default_method,
-    problems_of_scene,
-    selected_methods,
-)
+from rotor_mbs.methods.catalogue import check_names, default_method
 from rotor_mbs.methods.method_file import ENDING
+from rotor_mbs.methods.selection import problems_of_scene, selected_methods
 from rotor_mbs.methods.time_limit import valid_seconds
 from rotor_mbs.processes.pool import check_workers
 from rotor_mbs.runs.progress import progress_of_call

@@ -26,9 +26,9 @@ from rotor_mbs.methods.catalogue import (
     find_method,
     find_method_or_none,
     methods,
-    problems_of_methods,
 )
 from rotor_mbs.methods.method_file import ENDING
+from rotor_mbs.methods.selection import problems_of_methods
 from rotor_mbs.processes import cores
 from rotor_mbs.runs.progress import ProgressLine
 from rotor_mbs.runs.trailer import is_of_this_program

@@ -12,7 +12,7 @@ from pathlib import Path
 from rotor_mbs.analysis.text_tables import table_of_runs
 from rotor_mbs.cli.terminal import print_summary, print_table
 from rotor_mbs.errors import InputError
-from rotor_mbs.methods.catalogue import problems_of_scene, selected_methods, settings_of_any
+from rotor_mbs.methods.selection import problems_of_scene, selected_methods
 from rotor_mbs.processes.pool import local_pool
 from rotor_mbs.runs.output_files import is_being_written, replace_file
 from rotor_mbs.runs.progress import ProgressLine
@@ -50,8 +50,6 @@ def run(arguments: argparse.Namespace) -> int:
     scenes = [scene for scene in scenes if methods[scene.name]]
     if not scenes:
         raise InputError(map(str, refused))
-    # Without those of refused methods alone: a setting that no method has is an error.
-    settings = settings_of_any([name for able in methods.values() for name in able], settings)
     with ProgressLine() as progress:
         report = run_scenes(
             scenes, methods, arguments.output, workers=arguments.jobs, timeout_s=arguments.timeout,

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 
 from rotor_mbs.cli import EXIT_BAD_INPUT, EXIT_FAILED, EXIT_OK
 from rotor_mbs.errors import printable
-from rotor_mbs.methods.catalogue import REFERENCE, Refusal
+from rotor_mbs.methods.catalogue import REFERENCE
+from rotor_mbs.methods.selection import Refusal
 from rotor_mbs.runs.progress import coloured
 from rotor_mbs.scenario.keys import counted
 from rotor_mbs.solution.status import REFUSED

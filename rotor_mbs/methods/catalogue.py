@@ -2,7 +2,7 @@
 
 Packages add methods by entry points. A model's code is imported when one of its methods is first
 used; its engine, when a solver is built. Which methods run a scene, with which settings, is decided
-here too; which ones to take where none is named, in `selection`.
+in `selection`.
 """
 
 from __future__ import annotations
@@ -11,22 +11,17 @@ import functools
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from importlib import import_module, metadata
 from pathlib import Path
 from pkgutil import resolve_name
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TypeVar
 
-from rotor_mbs.errors import InputError, MethodRefusal, nearest, shown_value
+from rotor_mbs.errors import InputError, nearest, shown_value
 from rotor_mbs.methods.base import Ladder, Method
 from rotor_mbs.methods.method_file import ENDING, MethodFile, located, quiet, read_file
-from rotor_mbs.methods.selection import recommend
-from rotor_mbs.methods.settings import unknown_setting
-from rotor_mbs.scenario.toml_file import KeyProblem, file_path
-
-if TYPE_CHECKING:  # `rotor-mbs list` reads no scene
-    from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.scenario.toml_file import file_path
 
 REFERENCE = "reference"
 PRINTED = "printed/ode45"  # with all errata
@@ -91,7 +86,7 @@ def find_method(name: str) -> Method:
     """Return the method of a name, "reference" included. Raises InputError for an unknown name."""
     method = find_method_or_none(name)
     if method is None:
-        raise InputError(_unknown([name]))
+        raise InputError(unknown_names([name]))
     return method
 
 
@@ -113,12 +108,12 @@ def check_names(names: str | Sequence[str]) -> tuple[str, ...]:
         With a line for every unknown name; of the first file that cannot be loaded.
     """
     names = _with_files([names] if isinstance(names, str) else names)
-    if unknown := _unknown(names):
+    if unknown := unknown_names(names):
         raise InputError(unknown)
     return tuple(dict.fromkeys(names))
 
 
-def _unknown(names: Sequence[str]) -> list[str]:
+def unknown_names(names: Sequence[str]) -> list[str]:
     """Return a line for each of the names that no method has."""
     # Without names no model need be imported.
     known = method_names() if names else ()
@@ -357,226 +352,3 @@ def _sources(module: str) -> tuple[Path, ...]:
     if folders:
         return tuple(path for folder in folders for path in sorted(folder.rglob("*.py")))
     return (Path(top.__file__),) if top.__file__ else ()
-
-
-# Settings
-
-
-def settings_for(names: Sequence[str], given: Mapping[str, object]) -> dict[str, dict[str, object]]:
-    """Distribute settings to the methods that have them.
-
-    Parameters
-    ----------
-    names : known methods.
-    given : settings by name.
-
-    Returns
-    -------
-    dict
-        By method, those of the settings that it has.
-
-    Raises
-    ------
-    InputError
-        For a setting that none of the methods has, and for a value that is not allowed.
-    """
-    if len(names) == 1:
-        # Its own message lists the settings with all that is allowed.
-        find_method(names[0]).settings.of(names[0], given)
-    declared = {name: find_method(name).settings.declared() for name in names}
-    known = list(dict.fromkeys(setting for settings in declared.values() for setting in settings))
-    unknown = [setting for setting in given if setting not in known]
-    if unknown and names:
-        allowed = f"{', '.join(known) or 'none'} ({', '.join(names)})"
-        problems = []
-        for setting in unknown:
-            problems.append(f"{unknown_setting(setting, known)}; allowed: {allowed}")
-        raise InputError(problems)
-    by_method = {}
-    for name, settings in declared.items():
-        by_method[name] = {key: value for key, value in given.items() if key in settings}
-        find_method(name).settings.of(name, by_method[name])  # checks the values
-    return by_method
-
-
-def settings_of_any(names: Iterable[str], given: Mapping[str, object]) -> dict[str, object]:
-    """Return those of the `given` settings that at least one of the named methods has."""
-    known = {setting for name in names for setting in find_method(name).settings.declared()}
-    return {setting: value for setting, value in given.items() if setting in known}
-
-
-def own_settings(scene: Scene, method: str) -> dict[str, object]:
-    """Return those of a scene's own settings that a method has.
-
-    Parameters
-    ----------
-    scene : the scene.
-    method : name of the method.
-
-    Raises
-    ------
-    InputError
-        If the scene has a setting that no method at all has.
-    """
-    if not scene.settings:
-        return {}
-    try:
-        return settings_for(method_names(), dict(scene.settings)).get(method, {})
-    except InputError as error:
-        lines = [f"{scene.name}: settings: {problem}" for problem in error.problems]
-        raise InputError(lines) from error
-
-
-def problems_of_methods(values: Mapping[str, Any]) -> list[KeyProblem]:
-    """Return what is wrong with the `methods` that a scene file or a sweep file names."""
-    return [KeyProblem(("methods",), line) for line in _unknown(values.get("methods", ()))]
-
-
-def problems_of_scene(values: Mapping[str, Any]) -> list[KeyProblem]:
-    """Return what is wrong with the `methods` and `settings` of a scene file.
-
-    A sweep's settings have to be those of the methods that it is run with; a scene's, of any.
-    """
-    problems = problems_of_methods(values)
-    settings = dict(values.get("settings", ()))
-    if settings:
-        try:
-            settings_for(method_names(), settings)
-        except InputError as error:
-            problems += [KeyProblem(("settings",), problem) for problem in error.problems]
-    return problems
-
-
-# Methods of scenes
-
-
-@dataclass(frozen=True)
-class Refusal:
-    """A run that is left out: its method cannot represent the scene, or its settings do not fit it.
-
-    Attributes
-    ----------
-    scene, method : their names; "" for `method` if no method was selected for the scene.
-    reason : in one sentence.
-    is_asked : whether the method or its settings were named, by the call or by the scene, not
-        selected by a rule.
-    """
-
-    scene: str
-    method: str
-    reason: str
-    is_asked: bool = True
-
-    def __str__(self) -> str:
-        run = f"{self.method} on {self.scene}" if self.method else self.scene
-        return f"not run: {run}: {self.reason}"
-
-
-def supporting_methods(
-    scene: Scene,
-    names: Iterable[str],
-    settings: Mapping[str, Mapping[str, object]] | None = None,
-    *,
-    are_named: bool = True,
-) -> tuple[list[str], list[Refusal]]:
-    """Return those of some methods that can run a scene, and a Refusal for each of the others.
-
-    This is where every command decides what it leaves out.
-
-    Parameters
-    ----------
-    scene : the scene.
-    names : known methods.
-    settings : by method, settings in place of the scene's own and the defaults; already valid by
-        their declared ranges. None if the caller chooses settings that fit.
-    are_named : whether the user named the methods.
-
-    Raises
-    ------
-    InputError
-        If the scene has a setting that no method has.
-    """
-    supporting: list[str] = []
-    refused: list[Refusal] = []
-    for name in names:
-        method = find_method(name)
-        # What a file's method raises while it is built is an InputError.
-        try:
-            method.items(scene)
-        except (MethodRefusal, InputError) as exc:
-            refused.append(Refusal(scene.name, name, _reason(exc, name), are_named))
-            continue
-        if settings is not None:
-            own = own_settings(scene, name) | dict(settings.get(name, {}))
-            # Declared ranges are checked before any scene: what is left is that they do not fit
-            # this one.
-            try:
-                method.chosen(scene, own)
-            except InputError as exc:
-                is_asked = are_named or bool(own)
-                refused.append(Refusal(scene.name, name, _reason(exc, name), is_asked))
-                continue
-        supporting.append(name)
-    return supporting, refused
-
-
-def _reason(error: Exception, method: str) -> str:
-    """Return the text of an error without the method's name in front."""
-    return str(error).removeprefix(f"{method}: ")
-
-
-def selected_methods(
-    scenes: Sequence[Scene],
-    names: Sequence[str] = (),
-    settings: Mapping[str, object] | None = None,
-) -> tuple[dict[str, list[str]], list[str], list[Refusal]]:
-    """Select the methods of each scene: those named, else those that it names itself, else by rule.
-
-    Parameters
-    ----------
-    scenes : the scenes.
-    names : known methods; () for none.
-    settings : of the call, for the methods that have them.
-
-    Returns
-    -------
-    methods : by scene name; an empty list where none can run.
-    reasons : a line for each scene for which the rule selected methods.
-    refused : the methods that were left out, and the scenes for which the rule selects none.
-
-    Raises
-    ------
-    InputError
-        For an unknown method of a scene, and for a setting that none of the methods has or whose
-        value is invalid.
-    """
-    wanted: dict[str, list[str]] = {}
-    rules: dict[str, str] = {}
-    refused: list[Refusal] = []
-    for scene in scenes:
-        if not names and (unknown := _unknown(scene.methods)):
-            raise InputError(f"{scene.name}: methods: {line}" for line in unknown)
-        wanted[scene.name] = list(names or dict.fromkeys(scene.methods))
-        if not wanted[scene.name]:
-            try:
-                recommended, reason = recommend(scene, default_methods())
-            except MethodRefusal as exc:
-                refused.append(Refusal(scene.name, "", _reason(exc, scene.name)))
-            else:
-                wanted[scene.name] = list(recommended)
-                rules[scene.name] = reason
-    all_names = list(dict.fromkeys(name for methods in wanted.values() for name in methods))
-    valid_settings = settings_for(all_names, settings or {})
-    selected: dict[str, list[str]] = {}
-    for scene in scenes:
-        are_named = bool(names or scene.methods)
-        supporting, others = supporting_methods(
-            scene,
-            wanted[scene.name],
-            valid_settings,
-            are_named=are_named,
-        )
-        selected[scene.name] = supporting
-        refused += others
-    reasons = [f"{name}: {reason}: {', '.join(selected[name])}" for name, reason in rules.items()]
-    return selected, reasons, refused

@@ -1,17 +1,258 @@
-"""Select methods for a scene by a rule if none is named.
+"""Decide which methods run a scene, with which settings.
 
-The rule is drawn from the stability suite: which methods fail, or take minutes, on which scenes.
+Those that are named, as far as they can represent the scene; where none is named, those of a rule
+that is drawn from the stability suite: which methods fail, or take minutes, on which scenes.
 """
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
-from rotor_mbs.errors import MethodRefusal
+from rotor_mbs.errors import InputError, MethodRefusal
+from rotor_mbs.methods.catalogue import (
+    default_methods,
+    find_method,
+    method_names,
+    unknown_names,
+)
+from rotor_mbs.methods.settings import unknown_setting
+from rotor_mbs.scenario.toml_file import KeyProblem
 
 if TYPE_CHECKING:  # `rotor-mbs list` reads no scene
     from rotor_mbs.scenario.scene import Scene
+
+
+# Settings
+
+
+def settings_for(names: Sequence[str], given: Mapping[str, object]) -> dict[str, dict[str, object]]:
+    """Distribute settings to the methods that have them.
+
+    Parameters
+    ----------
+    names : known methods.
+    given : settings by name.
+
+    Returns
+    -------
+    dict
+        By method, those of the settings that it has.
+
+    Raises
+    ------
+    InputError
+        For a setting that none of the methods has, and for a value that is not allowed.
+    """
+    if len(names) == 1:
+        # Its own message lists the settings with all that is allowed.
+        find_method(names[0]).settings.of(names[0], given)
+    declared = {name: find_method(name).settings.declared() for name in names}
+    known = list(dict.fromkeys(setting for settings in declared.values() for setting in settings))
+    unknown = [setting for setting in given if setting not in known]
+    if unknown and names:
+        allowed = f"{', '.join(known) or 'none'} ({', '.join(names)})"
+        problems = []
+        for setting in unknown:
+            problems.append(f"{unknown_setting(setting, known)}; allowed: {allowed}")
+        raise InputError(problems)
+    by_method = {}
+    for name, settings in declared.items():
+        by_method[name] = {key: value for key, value in given.items() if key in settings}
+        find_method(name).settings.of(name, by_method[name])  # checks the values
+    return by_method
+
+
+def own_settings(scene: Scene, method: str) -> dict[str, object]:
+    """Return those of a scene's own settings that a method has.
+
+    Parameters
+    ----------
+    scene : the scene.
+    method : name of the method.
+
+    Raises
+    ------
+    InputError
+        If the scene has a setting that no method at all has.
+    """
+    if not scene.settings:
+        return {}
+    try:
+        return settings_for(method_names(), dict(scene.settings)).get(method, {})
+    except InputError as error:
+        lines = [f"{scene.name}: settings: {problem}" for problem in error.problems]
+        raise InputError(lines) from error
+
+
+def settings_of_run(scene: Scene, method: str, given: Mapping[str, object]) -> dict[str, object]:
+    """Return the settings of a run: those that are given, in place of the scene's own.
+
+    Parameters
+    ----------
+    scene, method : what is run.
+    given : settings by name, of which the method may have some; checked by `settings_for`.
+    """
+    declared = find_method(method).settings.declared()
+    of_method = {name: value for name, value in given.items() if name in declared}
+    return own_settings(scene, method) | of_method
+
+
+def problems_of_methods(values: Mapping[str, Any]) -> list[KeyProblem]:
+    """Return what is wrong with the `methods` that a scene file or a sweep file names."""
+    return [KeyProblem(("methods",), line) for line in unknown_names(values.get("methods", ()))]
+
+
+def problems_of_scene(values: Mapping[str, Any]) -> list[KeyProblem]:
+    """Return what is wrong with the `methods` and `settings` of a scene file.
+
+    A sweep's settings have to be those of the methods that it is run with; a scene's, of any.
+    """
+    problems = problems_of_methods(values)
+    settings = dict(values.get("settings", ()))
+    if settings:
+        try:
+            settings_for(method_names(), settings)
+        except InputError as error:
+            problems += [KeyProblem(("settings",), problem) for problem in error.problems]
+    return problems
+
+
+# Methods of scenes
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """A run that is left out: its method cannot represent the scene, or its settings do not fit it.
+
+    Attributes
+    ----------
+    scene, method : their names; "" for `method` if no method was selected for the scene.
+    reason : in one sentence.
+    is_asked : whether the method or its settings were named, by the call or by the scene, not
+        selected by a rule.
+    """
+
+    scene: str
+    method: str
+    reason: str
+    is_asked: bool = True
+
+    def __str__(self) -> str:
+        run = f"{self.method} on {self.scene}" if self.method else self.scene
+        return f"not run: {run}: {self.reason}"
+
+
+def supporting_methods(
+    scene: Scene,
+    names: Iterable[str],
+    settings: Mapping[str, object] | None = None,
+    *,
+    are_named: bool = True,
+) -> tuple[list[str], list[Refusal]]:
+    """Return those of some methods that can run a scene, and a Refusal for each of the others.
+
+    This is where every command decides what it leaves out.
+
+    Parameters
+    ----------
+    scene : the scene.
+    names : known methods.
+    settings : for the methods that have them, in place of the scene's own and the defaults;
+        already valid by their declared ranges. None if the caller chooses settings that fit.
+    are_named : whether the user named the methods.
+
+    Raises
+    ------
+    InputError
+        If the scene has a setting that no method has.
+    """
+    supporting: list[str] = []
+    refused: list[Refusal] = []
+    for name in names:
+        method = find_method(name)
+        # What a file's method raises while it is built is an InputError.
+        try:
+            method.items(scene)
+        except (MethodRefusal, InputError) as exc:
+            refused.append(Refusal(scene.name, name, _reason(exc, name), are_named))
+            continue
+        if settings is not None:
+            own = settings_of_run(scene, name, settings)
+            # Declared ranges are checked before any scene: what is left is that they do not fit
+            # this one.
+            try:
+                method.chosen(scene, own)
+            except InputError as exc:
+                is_asked = are_named or bool(own)
+                refused.append(Refusal(scene.name, name, _reason(exc, name), is_asked))
+                continue
+        supporting.append(name)
+    return supporting, refused
+
+
+def _reason(error: Exception, method: str) -> str:
+    """Return the text of an error without the method's name in front."""
+    return str(error).removeprefix(f"{method}: ")
+
+
+def selected_methods(
+    scenes: Sequence[Scene],
+    names: Sequence[str] = (),
+    settings: Mapping[str, object] | None = None,
+) -> tuple[dict[str, list[str]], list[str], list[Refusal]]:
+    """Select the methods of each scene: those named, else those that it names itself, else by rule.
+
+    Parameters
+    ----------
+    scenes : the scenes.
+    names : known methods; () for none.
+    settings : of the call, for the methods that have them.
+
+    Returns
+    -------
+    methods : by scene name; an empty list where none can run.
+    reasons : a line for each scene for which the rule selected methods.
+    refused : the methods that were left out, and the scenes for which the rule selects none.
+
+    Raises
+    ------
+    InputError
+        For an unknown method of a scene, and for a setting that none of the methods has or whose
+        value is invalid.
+    """
+    wanted: dict[str, list[str]] = {}
+    rules: dict[str, str] = {}
+    refused: list[Refusal] = []
+    for scene in scenes:
+        if not names and (unknown := unknown_names(scene.methods)):
+            raise InputError(f"{scene.name}: methods: {line}" for line in unknown)
+        wanted[scene.name] = list(names or dict.fromkeys(scene.methods))
+        if not wanted[scene.name]:
+            try:
+                recommended, reason = recommend(scene, default_methods())
+            except MethodRefusal as exc:
+                refused.append(Refusal(scene.name, "", _reason(exc, scene.name)))
+            else:
+                wanted[scene.name] = list(recommended)
+                rules[scene.name] = reason
+    all_names = list(dict.fromkeys(name for methods in wanted.values() for name in methods))
+    settings_for(all_names, settings or {})  # refuses what no method has
+    selected: dict[str, list[str]] = {}
+    for scene in scenes:
+        are_named = bool(names or scene.methods)
+        supporting, others = supporting_methods(
+            scene, wanted[scene.name], settings or {}, are_named=are_named
+        )
+        selected[scene.name] = supporting
+        refused += others
+    reasons = [f"{name}: {reason}: {', '.join(selected[name])}" for name, reason in rules.items()]
+    return selected, reasons, refused
+
+
+# The rule
 
 # Explicit fixed steps at their default (1e-3 s and below) follow a swing up to this rate, rad/s,
 # within their bounds.

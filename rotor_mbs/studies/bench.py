@@ -32,6 +32,7 @@ from rotor_mbs.errors import (
 )
 from rotor_mbs.methods import catalogue
 from rotor_mbs.methods.base import STEP, TOLERANCE, Ladder, Method
+from rotor_mbs.methods.selection import Refusal, supporting_methods
 from rotor_mbs.methods.time_limit import OutOfTimeError, caller_signals, time_limit
 from rotor_mbs.processes import last_core
 from rotor_mbs.processes.pool import WorkerPool
@@ -579,7 +580,7 @@ def run_bench(
     budget_s: float,
     workers: int,
     on_progress: OnProgress = ignore_progress,
-) -> tuple[list[RunOutcome], list[catalogue.Refusal]]:
+) -> tuple[list[RunOutcome], list[Refusal]]:
     """Measure the curves of every scene into a results file; what it has already is kept.
 
     Parameters
@@ -617,23 +618,23 @@ def run_bench(
         # scenes whose reference was computed again: their curves are measured again
         changed = {run.label.partition(" ")[0] for run in report.computed}
         curves: list[Curve] = []
-        refused: list[catalogue.Refusal] = []
+        refused: list[Refusal] = []
         options = {"repeats": repeats, "budget_s": budget_s}
         names = dict.fromkeys(method.name for method, _ in chosen)
         for scene in scenes:
             if scene.name in failed:
                 run = failed[scene.name]
                 reason = f"no usable reference ({run.status}: {run.message}); a bench needs one"
-                refused.append(catalogue.Refusal(scene.name, "", reason))
+                refused.append(Refusal(scene.name, "", reason))
                 continue
             place = TableFile(output).place(f"{scene.name}/{catalogue.REFERENCE}")
             try:
                 bench_inputs(scene, place)
             except InputError as exc:
                 reason = str(exc).removeprefix(f"{scene.name}: ")
-                refused.append(catalogue.Refusal(scene.name, "", reason))
+                refused.append(Refusal(scene.name, "", reason))
                 continue
-            able, others = catalogue.supporting_methods(scene, names, are_named=bool(methods))
+            able, others = supporting_methods(scene, names, are_named=bool(methods))
             curves += [
                 curve_of(scene, method, ladder, options)
                 for method, ladder in chosen

@@ -24,9 +24,9 @@ from rotor_mbs.methods.catalogue import (
     default_methods,
     find_method,
     method_names,
-    supporting_methods,
 )
 from rotor_mbs.methods.method_file import ENDING
+from rotor_mbs.methods.selection import supporting_methods
 from rotor_mbs.runs.design import MISSING, RUNS
 from rotor_mbs.runs.hdf5 import reading
 from rotor_mbs.runs.output_files import is_being_written

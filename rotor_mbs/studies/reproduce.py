@@ -15,12 +15,11 @@ from rotor_mbs.analysis.published import claims, finding
 from rotor_mbs.analysis.text_tables import TextTable, method_table
 from rotor_mbs.methods.catalogue import (
     REFERENCE,
-    Refusal,
     default_methods,
     errata_methods,
     ladders,
-    supporting_methods,
 )
+from rotor_mbs.methods.selection import Refusal, supporting_methods
 from rotor_mbs.processes.pool import Workers, pool_of
 from rotor_mbs.runs.design import results_tables
 from rotor_mbs.runs.merge import fit_file_to_request

@@ -19,9 +19,8 @@ from rotor_mbs.methods.catalogue import (
     find_method,
     find_method_or_none,
     is_corrected,
-    own_settings,
-    settings_for,
 )
+from rotor_mbs.methods.selection import own_settings, settings_of_run
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError, caller_signals, time_limit
 from rotor_mbs.processes.pool import Workers, pool_of
@@ -233,15 +232,12 @@ def asked_runs(
     Raises
     ------
     InputError
-        For unknown methods and settings.
+        For unknown methods, and settings of a scene that no method has.
     """
-    of_call = settings_for(
-        list(dict.fromkeys(name for scene in scenes for name in methods[scene.name])), settings
-    )
     asked: list[RunRequest] = []
     for scene in scenes:
         runs = [
-            RunRequest(scene, name, own_settings(scene, name) | of_call[name])
+            RunRequest(scene, name, settings_of_run(scene, name, settings))
             for name in methods[scene.name]
         ]
         digest = scene_hash(scene)

@@ -14,14 +14,11 @@ from rotor_mbs.analysis.text_tables import TextTable
 from rotor_mbs.errors import InputError
 from rotor_mbs.methods.base import STEP
 from rotor_mbs.methods.catalogue import (
-    Refusal,
     find_method,
     is_corrected,
     method_names,
-    settings_for,
-    settings_of_any,
-    supporting_methods,
 )
+from rotor_mbs.methods.selection import Refusal, settings_for, supporting_methods
 from rotor_mbs.methods.time_limit import caller_signals
 from rotor_mbs.processes.pool import Workers, pool_of
 from rotor_mbs.runs.design import RunRequest
@@ -206,11 +203,11 @@ def run_suite(
         InputError also if no run is left.
     """
     names = methods or method_names(is_corrected=True)
-    chosen_settings = settings_for(list(names), settings or {})
+    settings_for(list(names), settings or {})  # refuses what no method has
     asked: dict[str, list[str]] = {}
     refused: list[Refusal] = []
     for scene in scenes:
-        able, others = supporting_methods(scene, names, chosen_settings, are_named=bool(methods))
+        able, others = supporting_methods(scene, names, settings or {}, are_named=bool(methods))
         asked[scene.name] = able
         refused += others
     if not any(asked.values()):
@@ -225,16 +222,13 @@ def run_suite(
         # The patient method first: a run that ended at its longer limit is not computed again with
         # the shorter one.
         for chosen, limit_s in ((patient, max(timeout_s, _PATIENT_S)), (asked, timeout_s)):
-            own = settings_of_any(
-                [name for able in chosen.values() for name in able], settings or {}
-            )
             report = run_scenes(
                 scenes,
                 chosen,
                 output,
                 workers=pool,
                 timeout_s=limit_s,
-                settings=own,
+                settings=settings,
                 on_progress=on_progress,
             )
             made += report.computed

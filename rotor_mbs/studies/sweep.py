@@ -20,14 +20,12 @@ from rotor_mbs.analysis.judgement import clearly_ok, defects_of, judge
 from rotor_mbs.errors import InputError, MethodRefusal
 from rotor_mbs.methods.base import checked_result
 from rotor_mbs.methods.catalogue import (
-    Refusal,
     check_names,
     default_method,
     find_method,
     is_corrected,
-    settings_for,
-    supporting_methods,
 )
+from rotor_mbs.methods.selection import Refusal, settings_for, supporting_methods
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError, caller_signals, time_limit
 from rotor_mbs.models.lagrange.reference import error_growth
@@ -448,7 +446,7 @@ def plan_sweep(
     named = check_names(methods or sweep.design.methods or default_method())
     with sweep.file.with_line_numbers("settings"):
         settings = settings_for(named, sweep.design.settings)
-    able, refused = supporting_methods(sweep.base, named, settings)
+    able, refused = supporting_methods(sweep.base, named, sweep.design.settings)
     if not able:
         raise MethodRefusal("\n".join(map(str, refused)))
     chosen = tuple(able)

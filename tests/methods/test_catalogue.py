@@ -21,9 +21,8 @@ from rotor_mbs.methods.catalogue import (
     find_method,
     is_corrected,
     methods,
-    selected_methods,
 )
-from rotor_mbs.methods.selection import recommend, singular_reason
+from rotor_mbs.methods.selection import recommend, selected_methods, singular_reason
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.scenario.catalogue import find_scenes
 

@@ -11,7 +11,8 @@ import pytest
 
 from rotor_mbs.errors import InputError
 from rotor_mbs.methods.base import Method
-from rotor_mbs.methods.catalogue import find_method, methods, settings_for
+from rotor_mbs.methods.catalogue import find_method, methods
+from rotor_mbs.methods.selection import settings_for
 from rotor_mbs.methods.settings import Settings, choice, number
 
 ALL = [*methods(), find_method("reference")]

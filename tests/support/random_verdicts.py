@@ -24,7 +24,8 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from rotor_mbs.analysis.judgement import judge
-from rotor_mbs.methods.catalogue import find_method, supporting_methods
+from rotor_mbs.methods.catalogue import find_method
+from rotor_mbs.methods.selection import supporting_methods
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError
 from rotor_mbs.models.lagrange.heyoka_adapter import is_available
