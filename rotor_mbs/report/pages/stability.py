@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+
 from markupsafe import Markup
 
 from rotor_mbs.report.elements import (
@@ -17,7 +19,7 @@ from rotor_mbs.report.elements import (
 from rotor_mbs.report.looks import label_of, with_capital
 from rotor_mbs.report.numbers import typeset_title
 from rotor_mbs.report.pages import Report, method_cell
-from rotor_mbs.studies.stability import OUTCOMES, suite_table
+from rotor_mbs.studies.stability import OUTCOMES, SuiteRun, suite_table
 
 _METHODS_IN_A_TABLE = 7  # beside the scene, on a page of 1440 px
 _WRONG = ("inaccurate", "diverged", "singular", "solver_failed")
@@ -32,54 +34,16 @@ def stability_page(report: Report) -> PageContent:
     """
     runs = report.suite_runs
     methods = list(dict.fromkeys(run.method for run in runs))
-    scenes = {
-        scene: file
-        for scene, file in report.files.items()
-        if any(run.scene == scene for run in runs)
-    }
+    present = {run.scene for run in runs}
+    scenes = {scene: file for scene, file in report.files.items() if scene in present}
     # A singular run without a reference is left out: its scene may have no solution.
     compared = [run for run in runs if run.has_reference or run.status != "singular"]
-    good = {
-        method: sum(run.outcome == "ok" for run in compared if run.method == method)
-        for method in methods
-    }
-    counts = {method: sum(run.method == method for run in compared) for method in methods}
-    answer = []
-    if methods:
-        best = max(good.values())
-        names = [label_of(method) for method in methods if good[method] == best]
-        whole = max(counts.values())
-        text = Markup("<b>{}</b> {} ok on <b>{} of {} scenes</b> at default settings, the most.")
-        answer.append(
-            text.format(
-                with_capital(" and ".join(names[:3])),
-                "is" if len(names) == 1 else "are",
-                best,
-                whole,
-            )
-        )
-        # By the share: not every method has run every scene.
-        worst = min(methods, key=lambda method: good[method] / max(counts[method], 1))
-        if good[worst] < best:
-            text = Markup("The fewest: {}, {} of {}.")
-            answer.append(text.format(label_of(worst), good[worst], counts[worst]))
     claimed = sum(run.false_success for run in runs)
-    if claimed:
-        wrong = sum(run.outcome in _WRONG for run in runs)
-        text = Markup(
-            'Engines reported success for <span class="bad">{} of {} wrong results</span>.'
-        )
-        answer.append(text.format(claimed, max(wrong, claimed)))
-    else:
-        answer.append(Markup("No engine reported success for a wrong result."))
+    good = sum(run.outcome == "ok" for run in compared)
     facts = [
         Fact("Scenes", str(len(scenes)), "chosen to provoke failure"),
         Fact("Methods", str(len(methods))),
-        Fact(
-            "Runs that are ok",
-            f"{sum(good.values())} of {sum(counts.values())}",
-            "where a motion exists",
-        ),
+        Fact("Runs that are ok", f"{good} of {len(compared)}", "where a motion exists"),
         Fact(
             "Wrong, but reported as success",
             str(claimed),
@@ -87,62 +51,123 @@ def stability_page(report: Report) -> PageContent:
             "bad" if claimed else "good",
         ),
     ]
-    tables = []
+    tables: list[Element] = []
     for first in range(0, len(methods), _METHODS_IN_A_TABLE):
         shown = methods[first : first + _METHODS_IN_A_TABLE]
-        rows: list[Row] = []
-        for scene, file in scenes.items():
-            own = {run.method: run for run in runs if run.scene == scene}
-            row: list[TableCell | str] = [
-                TableCell(scene, href=file, note=typeset_title(report.scenes[scene].title))
-            ]
-            for method in shown:
-                if method not in own:
-                    row.append("")
-                    continue
-                run = own[method]
-                symbol, words = OUTCOMES[run.outcome]
-                if run.false_success:
-                    symbol, words = f"{symbol}!", f"{words}; the engine reported success"
-                kind = (
-                    "ok"
-                    if run.outcome in ("ok", "smaller_step")
-                    else "late"
-                    if run.outcome == "timed_out"
-                    else ""
-                )
-                kind = "wrong" if run.outcome in _WRONG else kind
-                title = f"{label_of(method)}: {words}. {run.message}".strip()
-                row.append(TableCell(symbol, mark=f"status {kind}".strip(), title=title))
-            rows.append(row)
-        tables.append(PageTable("Statuses", ("Scene", *map(method_cell, shown)), rows))
-    used = {run.outcome for run in runs}
-    # The key explains the outcomes that are in the map, and no others.
-    key = [(symbol, text) for outcome, (symbol, text) in OUTCOMES.items() if outcome in used]
-    if claimed:
-        key.append(("!", "the engine reported success for a wrong result"))
-    counted = suite_table(runs)
-    count_rows: list[Row] = [(method_cell(method), *cells) for method, *cells in counted.rows]
-    count_table = PageTable(
-        "Number of ok runs",
-        ("Method", *counted.head[1:-1], "Wrong, but reported as success"),
-        count_rows,
-    )
-    note = (
-        "Only scenes that have a solution are counted. After a +: runs that are ok with a smaller "
-        "step. Runs of the printed equations are counted as completed."
-    )
+        tables.append(_map(report, runs, scenes, shown))
     how = (
         "A mark is the status of the run, determined from its samples: finite values, end reached, "
         "energy balance, gaps in joints, difference from a quad-precision reference up to the "
         "horizon. A reported success is not relied on. The page of a scene has the reasons."
     )
-    meaning = Note(" · ".join(f"{symbol} {words}" for symbol, words in key))
-    summary: list[Element] = [count_table, Note(note)] if len(scenes) > 1 else []
     sections = [
-        Section("map", "Statuses", [*tables, meaning], how),
-        Section("summary", "Number of ok runs", summary),
+        Section("map", "Statuses", [*tables, _key(runs)], how),
+        Section("summary", "Number of ok runs", _counts(runs) if len(scenes) > 1 else []),
     ]
     return PageContent(
-        "Stiff and extreme scenes: range of each method", report.path.name, answer, facts, sections
+        "Stiff and extreme scenes: range of each method",
+        report.path.name,
+        [*_ranking(compared, methods), _false_successes(runs)],
+        facts,
+        sections,
     )
+
+
+def _ranking(compared: Sequence[SuiteRun], methods: Sequence[str]) -> list[Markup]:
+    """Return a sentence on the methods that are ok on most scenes, and one on those of the fewest.
+
+    Parameters
+    ----------
+    compared : the runs of scenes that have a solution.
+    methods : names, in the order of the map.
+    """
+    if not methods:
+        return []
+    good, counts = dict.fromkeys(methods, 0), dict.fromkeys(methods, 0)
+    for run in compared:
+        counts[run.method] += 1
+        good[run.method] += run.outcome == "ok"
+    best = max(good.values())
+    names = [label_of(method) for method in methods if good[method] == best]
+    text = Markup("<b>{}</b> {} ok on <b>{} of {} scenes</b> at default settings, the most.")
+    verb = "is" if len(names) == 1 else "are"
+    which = with_capital(" and ".join(names[:3]))
+    sentences = [text.format(which, verb, best, max(counts.values()))]
+    # By the share: not every method has run every scene.
+    worst = min(methods, key=lambda method: good[method] / max(counts[method], 1))
+    if good[worst] < best:
+        text = Markup("The fewest: {}, {} of {}.")
+        sentences.append(text.format(label_of(worst), good[worst], counts[worst]))
+    return sentences
+
+
+def _false_successes(runs: Sequence[SuiteRun]) -> Markup:
+    """Return a sentence on the wrong results for which the engines reported success."""
+    claimed = sum(run.false_success for run in runs)
+    if not claimed:
+        return Markup("No engine reported success for a wrong result.")
+    wrong = sum(run.outcome in _WRONG for run in runs)
+    text = Markup('Engines reported success for <span class="bad">{} of {} wrong results</span>.')
+    return text.format(claimed, max(wrong, claimed))
+
+
+def _map(
+    report: Report, runs: Sequence[SuiteRun], scenes: Mapping[str, str], methods: Sequence[str]
+) -> PageTable:
+    """Return a table with a row per scene and a column per method.
+
+    Parameters
+    ----------
+    report : has the titles of the scenes.
+    runs : of the suite.
+    scenes : files of the scenes' pages by name.
+    methods : names of the methods that are shown.
+    """
+    by_place = {(run.scene, run.method): run for run in runs}
+    rows: list[Row] = []
+    for scene, file in scenes.items():
+        title = typeset_title(report.scenes[scene].title)
+        row: list[TableCell | str] = [TableCell(scene, href=file, note=title)]
+        for method in methods:
+            run = by_place.get((scene, method))
+            row.append("" if run is None else _status_cell(run))
+        rows.append(row)
+    return PageTable("Statuses", ("Scene", *map(method_cell, methods)), rows)
+
+
+def _status_cell(run: SuiteRun) -> TableCell:
+    """Return the cell of a run: the symbol of its outcome, with the reason as its title."""
+    symbol, words = OUTCOMES[run.outcome]
+    if run.false_success:
+        symbol, words = f"{symbol}!", f"{words}; the engine reported success"
+    if run.outcome in _WRONG:
+        mark = "status wrong"
+    elif run.outcome == "timed_out":
+        mark = "status late"
+    elif run.outcome in ("ok", "smaller_step"):
+        mark = "status ok"
+    else:
+        mark = "status"
+    title = f"{label_of(run.method)}: {words}. {run.message}".strip()
+    return TableCell(symbol, mark=mark, title=title)
+
+
+def _key(runs: Sequence[SuiteRun]) -> Note:
+    """Return the explanation of the symbols that are in the map, and of no others."""
+    used = {run.outcome for run in runs}
+    key = [f"{symbol} {words}" for outcome, (symbol, words) in OUTCOMES.items() if outcome in used]
+    if any(run.false_success for run in runs):
+        key.append("! the engine reported success for a wrong result")
+    return Note(" · ".join(key))
+
+
+def _counts(runs: Sequence[SuiteRun]) -> list[Element]:
+    """Return a table of the number of ok runs of each method, and a note on what is counted."""
+    counted = suite_table(runs)
+    rows: list[Row] = [(method_cell(method), *cells) for method, *cells in counted.rows]
+    head = ("Method", *counted.head[1:-1], "Wrong, but reported as success")
+    note = (
+        "Only scenes that have a solution are counted. After a +: runs that are ok with a smaller "
+        "step. Runs of the printed equations are counted as completed."
+    )
+    return [PageTable("Number of ok runs", head, rows), Note(note)]
