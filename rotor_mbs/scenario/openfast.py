@@ -11,16 +11,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
 
 from rotor_mbs.errors import InputError
 from rotor_mbs.scenario import keys
 from rotor_mbs.scenario.openfast_files import MAX_ROWS, InputFile, table_columns
 from rotor_mbs.scenario.toml_file import shown_path
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
 
 MAX_NODES = 10_000
 _ANGLE = keys.within(keys.NUMBER, at_least=-360.0, at_most=360.0)
@@ -496,8 +494,6 @@ def _beamdyn_blade(main: InputFile, structure: InputFile, number: int) -> BladeM
     InputError
         If the blade has no mass.
     """
-    import numpy as np  # late: a scene is read without it
-
     file = main.file(f"BDBldFile({number})", "an input file of BeamDyn")
     sections = file.file("BldFile", "an input file of a BeamDyn blade")
     axis, twist = _reference_axis(file)
@@ -548,8 +544,6 @@ def _mass_properties(
     float, ndarray, ndarray
         Mass, kg; first moment about the root, (3,) kg m; inertia about it, (3, 3) kg m².
     """
-    import numpy as np  # late, as above
-
     mass, moment, about_root = 0.0, np.zeros(3), np.zeros((3, 3))
     pieces = np.diff(axis, axis=0)
     lengths = np.sqrt((pieces**2).sum(axis=1))
@@ -582,8 +576,6 @@ def _mass_properties(
 
 def _steiner(point: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the inertia of a unit mass at a point about the origin, (3, 3) m²."""
-    import numpy as np  # late, as above
-
     squared: NDArray[np.float64] = point @ point * np.eye(3) - np.outer(point, point)
     return squared
 
@@ -600,8 +592,6 @@ def _reference_axis(file: InputFile) -> tuple[NDArray[np.float64], NDArray[np.fl
     InputError
         If the table is missing, or all key points are equal.
     """
-    import numpy as np  # late, as above
-
     count = file.whole("kp_total", 2, MAX_ROWS)
     header = file.line_with("kp_xr", "kp_yr", "kp_zr", "initial_twist")
     if header < 0:
@@ -636,8 +626,6 @@ def _stations(file: InputFile) -> tuple[NDArray[np.float64], NDArray[np.float64]
     InputError
         If the table is missing or incomplete, fractions do not rise, or a mass is negative.
     """
-    import numpy as np  # late, as above
-
     count = file.whole("station_total", 2, MAX_ROWS)
     # Blocks of damping stand before the stations, and have rows of numbers, too.
     start = next((i for i, line in enumerate(file.lines) if _TABLE in line.upper()), -1)
@@ -678,8 +666,6 @@ def _section(
     fractions : (n,) of the stations.
     eta : fraction of the length at which the section is.
     """
-    import numpy as np  # late, as above
-
     right = min(max(int(np.searchsorted(fractions, eta)), 1), len(fractions) - 1)
     share = (eta - fractions[right - 1]) / (fractions[right] - fractions[right - 1])
     matrix = (1.0 - share) * matrices[right - 1] + share * matrices[right]
@@ -697,8 +683,6 @@ def _section_axes(tangent: NDArray[np.float64], twist: float) -> NDArray[np.floa
     tangent : (3,) of the reference axis: the section's z.
     twist : rad, about -z: the section's x, seen along the blade, is at this angle.
     """
-    import numpy as np  # late, as above
-
     x = np.array([math.cos(twist), -math.sin(twist), 0.0])
     x -= (x @ tangent) * tangent
     x /= math.sqrt(x @ x)
