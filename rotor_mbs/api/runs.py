@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, overload
+from typing import overload
 
 from rotor_mbs.api.results import Results, Run, TemporaryFolder
 from rotor_mbs.errors import InputError, MethodRefusal, ResourceError, shown_value
@@ -18,9 +18,6 @@ from rotor_mbs.scenario.catalogue import list_scenes, only_scene, scene_of
 from rotor_mbs.scenario.scene import Scene, load_scene
 from rotor_mbs.scenario.toml_file import file_path, plain_value
 from rotor_mbs.studies.run import run_scenes, solve_judged
-
-if TYPE_CHECKING:
-    pass
 
 _NO_LIMIT_S = 1e9
 _SHOWN = 5  # lines of lost runs
