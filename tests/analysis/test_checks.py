@@ -180,7 +180,7 @@ def of_stored(run: Solution, metrics: Any, name: str, stored_value: float) -> tu
     return checks._changed_metric(one, metrics, run)[:2]
 
 
-@pytest.mark.parametrize("method", [METHOD, PRINTED])
+@pytest.mark.parametrize("method", [pytest.param(METHOD, marks=pytest.mark.full), PRINTED])
 def test_a_stored_number_may_differ_by_what_rounding_or_other_points_decide(method: str) -> None:
     """And no other at all: errors, loads, the horizon, one for nothing."""
     short = (

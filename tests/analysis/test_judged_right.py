@@ -157,7 +157,7 @@ def with_late_fault(scene: Scene, share: float) -> Trajectory:
 @pytest.mark.parametrize(
     "fault",
     [
-        lambda s: with_jump(s, 0.05),
+        pytest.param(lambda s: with_jump(s, 0.05), marks=pytest.mark.full),
         lambda s: with_jump(s, 0.015),
         lambda s: with_late_fault(s, 0.003),
     ],
@@ -205,7 +205,9 @@ def test_thin_blades_are_judged() -> None:
     assert (verdict.status, verdict.message) == ("ok", "")
 
 
-@pytest.mark.parametrize("method", ["mujoco/rk4", "exudyn_tree/rk67"])
+@pytest.mark.parametrize(
+    "method", [pytest.param("mujoco/rk4", marks=pytest.mark.full), "exudyn_tree/rk67"]
+)
 def test_what_an_ill_conditioned_mass_matrix_loses_of_the_loads_is_no_fault(method: str) -> None:
     if not find_method(method).is_installed:
         pytest.skip(f"{method} is not installed")

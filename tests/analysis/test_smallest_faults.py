@@ -93,7 +93,9 @@ def rows_of(name: str, count: int) -> list[int]:
     return sorted({*np.linspace(1, length - 1, count).astype(int).tolist()}) if length > 1 else []
 
 
-@pytest.mark.parametrize("name", ["paper/fig11", "stiff/bearing-1e6"])
+@pytest.mark.parametrize(
+    "name", ["paper/fig11", pytest.param("stiff/bearing-1e6", marks=pytest.mark.full)]
+)
 def test_a_fault_of_twice_the_smallest_is_seen(name: str) -> None:
     (row,) = rows_of(name, 3)[1:2]
     assert judge_faults(name, row) > 0

@@ -54,7 +54,13 @@ def judged(name: str, changes: Arrays, tolerance: float = 1e-6) -> LoadCompariso
 
 @pytest.mark.parametrize(
     "name",
-    ["paper/fig08", "paper/fig11", "paper/fig15-10kNm", "check/general", "check/pitch-loads"],
+    [
+        "paper/fig08",
+        "paper/fig11",
+        "check/general",
+        pytest.param("paper/fig15-10kNm", marks=pytest.mark.full),
+        pytest.param("check/pitch-loads", marks=pytest.mark.full),
+    ],
 )
 def test_right_loads_are_accepted_at_1e_9(name: str) -> None:
     found = judged(name, {}, 1e-9)
@@ -249,6 +255,7 @@ def test_a_single_wrong_row_is_told_with_its_time() -> None:
     assert "at t = 0.2 s" in found.message
 
 
+@pytest.mark.full
 def test_only_columns_that_are_there_are_judged_and_omit_leaves_out(tmp_path: Path) -> None:
     """By the command, from a CSV with OpenFAST's names, axes and sign, in kN."""
     arrays, _ = data_of("check/pitch-loads")
@@ -348,6 +355,7 @@ def test_a_mapping_says_column_unit_sign_and_frame_of_a_load() -> None:
         )
 
 
+@pytest.mark.full
 def test_loads_of_few_digits_are_judged_by_them() -> None:
     """States and loads of six digits: right ones are ok, 0.1 % off is not."""
     arrays, _ = data_of("check/general")

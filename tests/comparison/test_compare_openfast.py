@@ -83,6 +83,7 @@ def test_every_channel_is_known_by_the_head_of_the_file(tmp_path: Path) -> None:
     assert "strain gages" in str(found.verdict.unused) or "LSSGagMya" not in chosen
 
 
+@pytest.mark.full
 def test_numbers_of_the_model_are_in_the_mapping() -> None:
     """AzimB1Up shifts the azimuth, HubCM moves the hub's weight; `new --from` writes both."""
     scene = rotor()

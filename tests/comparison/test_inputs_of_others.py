@@ -309,6 +309,7 @@ def test_rows_before_the_start_are_left_out_with_a_note(run: rm.Run) -> None:
         rm.compare(columns | {"time": columns["time"] - 2.0}, SCENE)
 
 
+@pytest.mark.full
 def test_two_rows_at_one_time_are_those_beside_a_jump_of_a_load_or_refused() -> None:
     scene = SCENE.replace(**{"torque.rotor": [[0.0, 0.0], [0.5, 0.0], [0.5, 5e4], [1.0, 5e4]]})
     run = rm.run(scene.replace(outputs=["angles", "rates", "loads"]), "lagrange/dop853")

@@ -49,6 +49,7 @@ def test_the_document_has_all_mistakes() -> None:
     assert judgements == {name: expected_of(name) for name in MISTAKES}
 
 
+@pytest.mark.full
 def test_a_pitch_that_rests_is_no_mean() -> None:
     """Where nothing moves, a mean over an interval is the number itself, and shows nothing."""
     scene = rm.scene("paper/fig11").replace(

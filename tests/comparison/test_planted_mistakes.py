@@ -465,12 +465,15 @@ def test_data_of_another_time_are_refused() -> None:
     )
 
 
-@pytest.mark.parametrize("scene", ["paper/fig11", "check/general"])
+@pytest.mark.parametrize(
+    "scene", ["paper/fig11", pytest.param("check/general", marks=pytest.mark.full)]
+)
 def test_a_true_run_with_the_noise_of_rounding_is_ok(scene: str) -> None:
     comparison = rm.compare(Plant("", scene, spoilt=noise(1e-12)).data(), short(scene))
     assert (comparison.status, comparison.likely) == ("ok", ())
 
 
+@pytest.mark.full
 def test_a_hub_that_is_too_light_is_not_named_as_a_missing_one() -> None:
     """A mistake of the same kind but another size leaves less than the tolerance, and a multiple
     of the missing hub's effect explains it."""

@@ -96,9 +96,10 @@ LOADED = replace(
 
 @pytest.mark.parametrize(
     "scene",
-    [pytest.param(DAMPED, marks=pytest.mark.full), LOADED],
+    [DAMPED, LOADED],
     ids=["damped", "pitch torques and rest angles"],
 )
+@pytest.mark.full
 def test_the_motion_repeats_itself_after_a_turn_also_by_other_equations(scene: Scene) -> None:
     turn = periodic_turn(scene, 1.2)
     end = oracle(scene, turn).y[:, -1]

@@ -174,14 +174,13 @@ ACCURACY = {
     "mujoco/rk4": (1e-10, 1e-12),
 }
 CHAIN_LOADS = 1e-5
+# One of each model; the others carry the mark full.
+QUICK = ("lagrange/dop853", "exudyn_tree/rk67", "mujoco/rk4")
 
 
 @pytest.mark.parametrize(
     "method",
-    [
-        pytest.param(name, marks=pytest.mark.full) if name in ("reference", CHAIN) else name
-        for name in ACCURACY
-    ],
+    [name if name in QUICK else pytest.param(name, marks=pytest.mark.full) for name in ACCURACY],
 )
 def test_a_motion_has_the_angles_energies_tips_and_loads_of_newtons_and_eulers_laws(
     method: str,

@@ -74,7 +74,9 @@ def test_the_mujoco_file_in_plain_mujoco(name: str, tmp_path: Path) -> None:
     assert np.abs(np.load(tmp_path / "out.npy") - ours).max() < 1e-9
 
 
-@pytest.mark.parametrize("name", [*SCENES, "check/pitch-loads"])
+@pytest.mark.parametrize(
+    "name", [*SCENES, pytest.param("check/pitch-loads", marks=pytest.mark.full)]
+)
 def test_the_exudyn_script_in_plain_python(name: str, tmp_path: Path) -> None:
     scene, exact = shipped(name), references.reference(name)
     (path,) = export(scene, "exudyn", tmp_path / "scene.py")

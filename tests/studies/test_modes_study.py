@@ -129,6 +129,7 @@ def test_a_slow_mode_that_is_wrong_is_found_out(monkeypatch):
     assert not study.compute_modes(scene).agrees
 
 
+@pytest.mark.full
 def test_models_that_agree_to_rounding_of_the_largest_eigenvalue_agree():
     """A mode 600 times slower than the largest has 2e-8 of its own frequency from rounding of 2e-11
     of that."""
