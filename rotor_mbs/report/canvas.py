@@ -10,7 +10,7 @@ import re
 import sys
 from collections.abc import Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from html import escape
 from os import PathLike
 from pathlib import Path
@@ -21,8 +21,7 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 
 from rotor_mbs.errors import InputError
-from rotor_mbs.report.elements import Plot
-from rotor_mbs.report.looks import GREY, PAPER, Look, name_of_colour
+from rotor_mbs.report.looks import PAPER, Look, name_of_colour
 from rotor_mbs.report.numbers import power
 from rotor_mbs.runs.output_files import replace_file
 from rotor_mbs.scenario.toml_file import file_path
@@ -237,58 +236,6 @@ _SUPERFLUOUS = re.compile(
 # The name of a marker or a clip area, where it is defined or referred to.
 _NAME = re.compile(r'(id="|="#|\(#)(?=[a-zA-Z]+[0-9a-f]{10})')
 _COLOUR = re.compile(r"#[0-9a-f]{6}\b")
-_STILL_WIDTH = 3.4  # in, of 100 px: 12 px are 12 px on a telephone's page
-_STILL_POINTS = 300  # largest number of points of a curve: about one per pixel
-
-
-def still(plot: Plot, name: str) -> Markup:
-    """Return a picture of a plot for a page without scripts, an `svg` element.
-
-    Parameters
-    ----------
-    plot : of curves with several rows the first row is drawn.
-    name : begins the names in the picture; unique on the page.
-    """
-    height = plot.height
-    with style():
-        figure = Figure(figsize=(_STILL_WIDTH, height / 100.0), dpi=100, facecolor="none")
-        axes: Any = figure.add_axes(
-            (0.15, 24.0 / height, 0.82, 1.0 - 32.0 / height), facecolor="none"
-        )
-        axes.tick_params(labelsize=9.0, colors=GREY)
-        has_values = False
-        for drawn in plot.curves:
-            x, y = drawn.x, drawn.y if drawn.y.ndim == 1 else drawn.y[0]
-            if plot.log:
-                y = np.where(y > 0.0, y, np.nan)
-            has_values = has_values or bool(np.isfinite(y).any())
-            index = extremes(y, _STILL_POINTS)
-            x, y = x[index], y[index]
-            after = np.searchsorted(index, drawn.breaks)  # a jump is a gap
-            x, y = np.insert(x, after, x[after]), np.insert(y, after, np.nan)
-            width = 3.0 if drawn.look.css == "reference" else 1.3
-            look = replace(
-                drawn.look,
-                marker="o" if drawn.dots else "",
-                line="" if drawn.dots == "only" else drawn.look.line,
-            )
-            curve(axes, x, y, look, width)
-        for mark in plot.marks:
-            line, place = (axes.axvline, mark.x) if mark.y is None else (axes.axhline, mark.y)
-            line(place, color=GREY, linestyle="--", linewidth=0.8)
-        if plot.x.log:
-            axes.set_xscale("log")
-        if plot.log and has_values:  # matplotlib refuses a logarithmic axis of nothing
-            axes.set_yscale("log")
-        elif plot.clip is not None:
-            low, high = axes.get_ylim()
-            axes.set_ylim(max(low, plot.clip[0]), min(high, plot.clip[1]))
-        axes.set_xlim(plot.x.first, plot.x.last)
-    inside = inside_of(encoded(figure, "svg", for_print=False), name)
-    return Markup(
-        f'<svg viewBox="0 0 {72.0 * _STILL_WIDTH:g} {0.72 * height:g}" role="img" '
-        f'aria-label="{escape(plot.name)}">{inside}</svg>'
-    )
 
 
 def path_picture(panels: Panels, name: str, caption: str) -> Markup:
@@ -333,29 +280,6 @@ def inside_of(file: bytes, name: str) -> str:
         return f"var(--{known})" if known else colour[0]
 
     return _NAME.sub(rf"\g<1>{name}", _COLOUR.sub(variable, text))
-
-
-def extremes(values: Any, most: int) -> NDArray[np.int64]:
-    """Return the indices of the samples to draw, ascending.
-
-    They are the ends, and the smallest and the largest finite sample of equal intervals, so that no
-    peak is lost.
-
-    Parameters
-    ----------
-    values : (n,).
-    most : approximate number of samples; where there are no more, all are returned.
-    """
-    count = len(values)
-    if count <= most:
-        return np.arange(count)
-    chosen = [0, count - 1]
-    # Two samples of each interval; NaN is replaced by what is never the smallest or the largest.
-    for interval in np.array_split(np.arange(count), most // 2):
-        known = np.isfinite(values[interval])
-        low, high = (np.where(known, values[interval], replaced) for replaced in (np.inf, -np.inf))
-        chosen += [int(interval[low.argmin()]), int(interval[high.argmax()])]
-    return np.unique(chosen)
 
 
 def log_axis(axes: Any, lowest: float, highest: float) -> None:

@@ -79,3 +79,31 @@ class CurveStore:
         if not self._parts:
             return ""
         return base64.b64encode(np.concatenate(self._parts).tobytes()).decode("ascii")
+
+
+def extremes(values: Any, most: int) -> NDArray[np.int64]:
+    """Return the indices of the samples to draw, ascending.
+
+    They are the ends, and the smallest and the largest finite sample of equal intervals, so that no
+    peak is lost.
+
+    Parameters
+    ----------
+    values : (n,).
+    most : approximate number of samples; where there are no more, all are returned.
+    """
+    count = len(values)
+    if count <= most:
+        return np.arange(count)
+    lengths = np.full(most // 2, count // (most // 2))
+    lengths[: count % len(lengths)] += 1
+    ends = lengths.cumsum()
+    # The samples of each interval; a shorter one has its last sample twice.
+    intervals = np.minimum((ends - lengths)[:, None] + np.arange(lengths[0]), ends[:, None] - 1)
+    known = np.isfinite(values[intervals])
+    chosen = [0, count - 1]
+    # Two samples of each; NaN is replaced by what is never the smallest or the largest.
+    for replaced, place in ((np.inf, np.argmin), (-np.inf, np.argmax)):
+        found = place(np.where(known, values[intervals], replaced), axis=1)
+        chosen += intervals[np.arange(len(ends)), found].tolist()
+    return np.unique(chosen)

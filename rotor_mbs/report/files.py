@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import hashlib
-import itertools
 import json
 import re
 from collections.abc import Iterable, Mapping, Sequence
@@ -18,8 +17,9 @@ from markupsafe import Markup, escape
 from rotor_mbs.errors import StoreError
 from rotor_mbs.report import numbers
 from rotor_mbs.report.curves import CurveStore
-from rotor_mbs.report.elements import PageContent, Plot
+from rotor_mbs.report.elements import PageContent
 from rotor_mbs.report.looks import palette_css
+from rotor_mbs.report.stills import still
 from rotor_mbs.runs.output_files import refuse_foreign, replace_file
 from rotor_mbs.runs.versions import made_with
 
@@ -140,10 +140,10 @@ def render(page: PageContent, made: Pairs = (), links: Pairs = (), here: str = "
     # Rendering fills the store: how many numbers a page has is known only then.
     template, store = _environment().get_template("page.html.j2"), CurveStore()
     known = {"page": page, "links": shown, "versions": made}
-    html = template.render(known, store=store, numbered=itertools.count(1).__next__)
+    html = template.render(known, store=store)
     if store.size > MAX_NUMBERS:
         store = CurveStore(every=-(-store.size // MAX_NUMBERS))
-        html = template.render(known, store=store, numbered=itertools.count(1).__next__)
+        html = template.render(known, store=store)
     scripts = "".join(
         f"<script>{_script(name)}</script>\n" for name, sign in _SCRIPTS.items() if sign in html
     )
@@ -212,18 +212,11 @@ def _environment() -> jinja2.Environment:
     environment.filters.update(
         typeset=numbers.typeset,
         breakable=_breakable,
-        still=_still,
+        still=still,
         as_json=script_json,
         as_text=partial(json.dumps, separators=(",", ":"), ensure_ascii=False, allow_nan=False),
     )
     return environment
-
-
-def _still(plot: Plot, number: int) -> Markup:
-    """Return a still picture of a plot; `number` is different for each picture of the page."""
-    from rotor_mbs.report.canvas import still  # late: matplotlib, which many pages do not need
-
-    return still(plot, f"still-{number}-")
 
 
 def _breakable(text: str) -> Markup:

@@ -14,6 +14,7 @@ import numpy as np
 from rotor_mbs.errors import InputError, shown_value
 from rotor_mbs.report import canvas
 from rotor_mbs.report.canvas import TIME_AXIS, Panels
+from rotor_mbs.report.curves import extremes
 from rotor_mbs.report.looks import BLUE, GREY, INK, RING, VERMILLION, Look, coordinate_look, look_of
 from rotor_mbs.report.numbers import prefix_of, with_unit
 from rotor_mbs.solution.metrics import angle_error, energy_scale, horizon
@@ -189,7 +190,7 @@ def thin(time: Array, values: Array) -> tuple[Array, Array]:
 
     So no peak is lost. time and values are (n,).
     """
-    index = canvas.extremes(values, _MAX_POINTS)
+    index = extremes(values, _MAX_POINTS)
     return time[index], values[index]
 
 
