@@ -15,7 +15,6 @@ from rotor_mbs.errors import StoreError
 from rotor_mbs.processes.pool import Workers, pool_of, run_in
 from rotor_mbs.report import files
 from rotor_mbs.report.elements import PageContent
-from rotor_mbs.report.figures import available
 from rotor_mbs.report.pages import Report
 from rotor_mbs.report.pages.bench import bench_page
 from rotor_mbs.report.pages.figures import figures_page
@@ -23,6 +22,7 @@ from rotor_mbs.report.pages.index import index_page
 from rotor_mbs.report.pages.paper import claims_page, errata_page
 from rotor_mbs.report.pages.scene import scene_page, short_name
 from rotor_mbs.report.pages.stability import stability_page
+from rotor_mbs.report.paper_figures import available
 from rotor_mbs.runs.hdf5 import reading
 from rotor_mbs.runs.read import is_sweep, open_results, read_records
 from rotor_mbs.runs.sweeps import StoredSweep

@@ -27,7 +27,7 @@ from rotor_mbs.analysis.run_checks import (
 )
 from rotor_mbs.methods.catalogue import REFERENCE
 from rotor_mbs.methods.solve import solve
-from rotor_mbs.report.figures import available
+from rotor_mbs.report.paper_figures import available
 from rotor_mbs.runs.read import open_results
 from rotor_mbs.scenario.accuracy_bounds import shipped_bounds
 from rotor_mbs.scenario.catalogue import REFERENCES

@@ -15,15 +15,9 @@ from support.scenes import paper
 from support.stored import Made, rotor, store
 
 from rotor_mbs.report.animation import wires
-from rotor_mbs.report.figures import (
-    FIGURES,
-    all_figures,
-    available,
-    caption_of,
-    composed,
-    differences,
-)
+from rotor_mbs.report.figures import caption_of, composed, differences
 from rotor_mbs.report.pages.scene_plots import parting
+from rotor_mbs.report.paper_figures import FIGURES, all_figures, available
 from rotor_mbs.runs.read import open_results
 from rotor_mbs.scenario.catalogue import find_scenes
 

@@ -20,7 +20,11 @@ from rotor_mbs.report.elements import (
     Plot,
     Section,
 )
-from rotor_mbs.report.figures import (
+from rotor_mbs.report.looks import Look, coordinate_look, label_of, step_look
+from rotor_mbs.report.numbers import in_words, minus, typeset_title
+from rotor_mbs.report.pages import Report, paper
+from rotor_mbs.report.pages.scene_plots import parting, range_of, whole_time
+from rotor_mbs.report.paper_figures import (
     CORRECTED,
     HEADINGS,
     MOTION,
@@ -31,10 +35,6 @@ from rotor_mbs.report.figures import (
     available,
     panel_runs,
 )
-from rotor_mbs.report.looks import Look, coordinate_look, label_of, step_look
-from rotor_mbs.report.numbers import in_words, minus, typeset_title
-from rotor_mbs.report.pages import Report, paper
-from rotor_mbs.report.pages.scene_plots import parting, range_of, whole_time
 from rotor_mbs.runs.read import StoredRun
 
 _KINDS = {
