@@ -71,6 +71,7 @@ _MODEL_COLOURS = (("blue", "navy"), ("brown", "vermillion"), ("green",), ("purpl
 _ERRATA = (("error-1", "^"), ("error-2", "P"), ("error-3", "h"))  # colour and marker
 # matplotlib's line styles, and what the style sheet calls them.
 _DASHES = {"-": "solid", "--": "dashed", "-.": "dashdot", ":": "dotted"}
+LINES = tuple(_DASHES)
 _MARKERS = ("o", "s", "^", "D", "v", "P", "X", "h", "p", "<", ">")
 
 

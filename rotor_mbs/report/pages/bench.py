@@ -31,7 +31,7 @@ from rotor_mbs.report.elements import (
     Section,
     TableCell,
 )
-from rotor_mbs.report.looks import COORDINATES, GREY, PALETTE, Look, label_of, look_of, with_capital
+from rotor_mbs.report.looks import GREY, LINES, PALETTE, Look, label_of, look_of, with_capital
 from rotor_mbs.report.numbers import NOTHING, number, shortest, with_unit
 from rotor_mbs.report.pages import method_cell, words_of
 from rotor_mbs.runs.design import COLUMNS
@@ -56,9 +56,14 @@ _NO_ENGINE = (
     "code",
     "plug-in",
 )  # versions that are not those of an engine
+# what differs from the colours of the catalogue's models, and from each other, light and dark
+_COLOURS_OF_FILES = tuple(
+    PALETTE[name][0] for name in ("rotor", "blade-4", "step-6", "blade-3", "blade-5", "step-3")
+)
 _FRONT = Look(PALETTE["ring"][0], "-", "", "best of all methods")
 _LOWEST_ERROR = 1e-16  # rad: smaller ones are drawn there
 _SCENES_IN_A_TABLE = 6  # beside the method
+_NAMES_IN_A_SENTENCE = 4
 
 
 def bench_page(results: OpenResults) -> PageContent:
@@ -75,8 +80,10 @@ def bench_page(results: OpenResults) -> PageContent:
     scenes = {name: grouped[name] for name in natural_order(grouped)}
     sections = []
     first = next(iter(scenes))
-    shown = diagrams(scenes[first])
-    elements: list[Grid | Fold | Element] = [*shown, Note(_conditions(first, scenes[first]))]
+    elements: list[Grid | Fold | Element] = [
+        *diagrams(scenes[first]),
+        Note(_conditions(first, scenes[first])),
+    ]
     others = []
     for name in [*scenes][1:]:
         note = Note(_conditions(name, scenes[name]))
@@ -86,14 +93,19 @@ def bench_page(results: OpenResults) -> PageContent:
     if others:
         elements += others
     sections.append(Section("diagram", f"Error against run time: {first}", elements, _LOWER_LEFT))
-    sections.append(_reach_section(scenes))
+    if len(scenes) == 1:
+        # The table of all scenes would have one column of it.
+        sections.append(Section("reach", "Time to an error", [_reach_table(scenes[first])]))
+    else:
+        sections.append(_reach_section(scenes))
     sections.append(_methods_section(results, scenes))
     folds = []
     whole = sum(len(curve.statuses) for curves in scenes.values() for curve in curves)
     for name, curves in scenes.items():
         count = sum(len(curve.statuses) for curve in curves)
         points = point_table(curves, only_faults=whole > _MAX_POINTS)
-        folds.append(Fold(name, f"{count} settings", [_reach_table(curves), points]))
+        shown = [points] if len(scenes) == 1 else [_reach_table(curves), points]
+        folds.append(Fold(name, f"{count} settings", shown))
     say = "Those that are not ok; all are in the file." if whole > _MAX_POINTS else ""
     sections.append(Section("points", "Every setting", folds, say))
     return PageContent(
@@ -145,11 +157,36 @@ def bench_answer(scenes: Mapping[str, Sequence[Record]]) -> list[Markup]:
             # The method that most often is the fastest of the other models.
             second = max(ratios, key=lambda method: len(ratios[method]))
             factor = number(float(np.median(ratios[second])))
-            text += Markup("; of another model {}, {} times slower").format(
+            text += Markup("; {}, the fastest of another model, takes {} times as long").format(
                 label_of(second), factor
             )
         sentences.append(text + ".")
+    never = _never_reaching(scenes, 1e-6)
+    if never and len(never) <= _NAMES_IN_A_SENTENCE:
+        names = " and ".join(filter(None, (", ".join(never[:-1]), never[-1])))
+        text = Markup("No setting of {} reaches 10⁻⁶ rad{}.")
+        sentences.append(text.format(names, "" if len(scenes) == 1 else " on any scene"))
     return sentences
+
+
+def _never_reaching(scenes: Mapping[str, Sequence[Record]], target: float) -> list[str]:
+    """Return the labels of the methods that reach an error on no scene.
+
+    A method of which settings were left out is not among them: these might reach it.
+
+    Parameters
+    ----------
+    scenes : the curves of the bench, by scene.
+    target : the error, rad.
+    """
+    curves = [curve for of_scene in scenes.values() for curve in of_scene]
+    able = {
+        curve.method
+        for curve in curves
+        if work_precision.left_out(curve) or work_precision.fastest([curve], target)
+    }
+    methods = dict.fromkeys(curve.method for curve in curves)
+    return [label_of(method) for method in methods if method not in able]
 
 
 def _model(method: str) -> str:
@@ -232,15 +269,18 @@ def _conditions(name: str, curves: Sequence[Record]) -> str:
 def curve_looks(curves: Sequence[Record]) -> dict[str, Look]:
     """Return a look for each curve by its name.
 
-    Methods of files, which would all be grey, have a colour for each file.
+    Methods of files, which would all be grey, have a colour for each file, and a line for each
+    method of it.
     """
     looks = {curve.name: look_of(curve.name) for curve in curves}
-    unknown = dict.fromkeys(_model(name) for name, look in looks.items() if look.colour == GREY)
-    colours = dict(zip(unknown, cycle(COORDINATES), strict=False))
-    return {
-        name: replace(look, colour=colours.get(_model(name), look.colour))
-        for name, look in looks.items()
-    }
+    unknown: dict[str, list[str]] = {}
+    for name, look in looks.items():
+        if look.colour == GREY:
+            unknown.setdefault(_model(name), []).append(name)
+    for names, colour in zip(unknown.values(), cycle(_COLOURS_OF_FILES), strict=False):
+        for name, line in zip(names, cycle(LINES), strict=False):
+            looks[name] = replace(looks[name], colour=colour, line=line)
+    return looks
 
 
 def diagrams(curves: Sequence[Record], group: str = "") -> list[Legend | Grid]:
@@ -420,7 +460,8 @@ def _methods_section(results: OpenResults, scenes: Mapping[str, Sequence[Record]
         hint = f"ok on {count}; best error {best}{unit}; to 10⁻⁶ rad: {reach}"
         folds.append(Fold(name, hint, [Listing(items)]))
     folds.append(Note(_EXPLAINED))
-    return Section("engines", "Each method over all scenes", folds)
+    title = "Each method" if len(scenes) == 1 else "Each method over all scenes"
+    return Section("engines", title, folds)
 
 
 def _in_a_line(cell: TableCell | str) -> str:
