@@ -22,6 +22,7 @@ REPRODUCED = Path("rotor-mbs-out")  # where `reproduce` writes
 EXPORT_FORMATS = ("mjcf", "exudyn", "csv")
 
 _MIN_SPEED, _MAX_SPEED = 1e-25, 1e25  # rad/s, as of numbers in a scene
+_SPEED_UNITS = {"rad/s": 1.0, "rpm": math.pi / 30.0}
 _MAX_SPAN = 10_000  # numbers of FROM:TO:COUNT
 _MAX_NUMBER = 1e9  # of a count; of seconds: thirty years
 
@@ -72,13 +73,13 @@ def folder(text: str) -> Path:
     return output
 
 
-def span(text: str, unit: float = 1.0) -> tuple[float, ...]:
+def span(text: str, unit: str = "rad/s") -> tuple[float, ...]:
     """Return COUNT equally spaced speeds from FROM to TO, both included, in rad/s.
 
     Parameters
     ----------
     text : "FROM:TO:COUNT".
-    unit : rad/s, of the numbers in the text.
+    unit : of the numbers in the text, "rad/s" or "rpm".
 
     Raises
     ------
@@ -87,7 +88,8 @@ def span(text: str, unit: float = 1.0) -> tuple[float, ...]:
     """
     try:
         start, end, number = text.split(":")
-        first, last, count = float(start) * unit, float(end) * unit, int(number)
+        size = _SPEED_UNITS[unit]
+        first, last, count = float(start) * size, float(end) * size, int(number)
         if -_MAX_SPEED <= first < last <= _MAX_SPEED and 2 <= count <= _MAX_SPAN:
             rounding = 1e-14 * max(abs(first), abs(last))
             numbers = []
@@ -103,14 +105,18 @@ def span(text: str, unit: float = 1.0) -> tuple[float, ...]:
     except ValueError:
         pass
     allowed = f"FROM:TO:COUNT with FROM < TO and COUNT from 2 to {_MAX_SPAN}"
-    allowed += f"; speeds that differ, each 0 or of a size from {_MIN_SPEED:g} to {_MAX_SPEED:g}"
-    allowed += " rad/s"
+    allowed += (
+        f"; speeds that differ, each 0 or of a size from {_MIN_SPEED:g} to {_MAX_SPEED:g} rad/s"
+    )
+    if unit != "rad/s":
+        lowest, highest = _MIN_SPEED / _SPEED_UNITS[unit], _MAX_SPEED / _SPEED_UNITS[unit]
+        allowed += f" ({lowest:.3g} to {highest:.3g} {unit})"
     raise _not_allowed(text, allowed)
 
 
 def span_in_rpm(text: str) -> tuple[float, ...]:
     """Return speeds in rad/s from "FROM:TO:COUNT" in rpm, see `span`."""
-    return span(text, math.pi / 30.0)
+    return span(text, "rpm")
 
 
 def part(text: str) -> tuple[int, int]:
@@ -250,7 +256,10 @@ def parse(argv: Sequence[str]) -> argparse.Namespace:
         )
     arguments, unknown = parser.parse_known_args(argv or ["--help"])
     if unknown:
-        commands.get(argv[0], parser).error(f"unrecognized arguments: {' '.join(unknown)}")
+        message = f"unrecognized arguments: {' '.join(unknown)}"
+        if argv[0] == "list" and not unknown[0].startswith("-"):
+            message += f"; allowed: none, or rotor-mbs show {unknown[0]} (a file, scene or method)"
+        commands.get(argv[0], parser).error(message)
     return arguments
 
 

@@ -1297,6 +1297,7 @@ MIN_DISTANCE, MAX_DISTANCE = 0.01, 300.0
 MIN_MASS, MAX_MASS = 0.01, 1e6  # kg
 MAX_LEAN = 0.5  # rad, of shaft and pitch axes: real rotors have 0.1
 USUAL_GRAVITY = (1.0, 30.0)  # m/s^2: the Moon, Jupiter
+KEYS_OF_LOADS = ("hub.radius", "hub.mass")  # that enter the loads alone
 
 
 def implausible_values(scene: Scene) -> list[str]:

@@ -6,6 +6,7 @@ import copy
 import dataclasses
 import functools
 import math
+import warnings
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -15,11 +16,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor_mbs.errors import InputError
+from rotor_mbs.errors import InputError, PlausibilityWarning
 from rotor_mbs.scenario import keys
 from rotor_mbs.scenario.catalogue import SCENARIOS, SWEEPS, list_scenes, only_scene
 from rotor_mbs.scenario.keys import Kind, file_key, invalid, list_of, restricted, table_of
 from rotor_mbs.scenario.scene import (
+    KEYS_OF_LOADS,
     OUTPUT_NAMES,
     Scene,
     ValuesCheck,
@@ -607,6 +609,11 @@ def _sweep(
     ------
     InputError
         With all errors of the file, and of the scenes that it makes.
+
+    Warns
+    -----
+    PlausibilityWarning
+        For a key that changes nothing that is stored.
     """
     with file.with_line_numbers():
         design = Design(**keys.read_keys(DESIGN_KEYS, file.tables, check))
@@ -650,6 +657,10 @@ def _sweep(
     with file.with_line_numbers():
         if faults:
             raise TableError(faults)
+    for key in sweep.keys:
+        if key in KEYS_OF_LOADS and "loads" not in sweep.outputs:
+            line = f'{key}: changes no run: it enters the loads alone, and "loads" is no output'
+            warnings.warn(f"{file.source}: {line}", PlausibilityWarning, stacklevel=3)
     return sweep
 
 

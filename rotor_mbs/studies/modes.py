@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.analysis import modes as modal
+from rotor_mbs.analysis.whirl import RPM
 from rotor_mbs.errors import InputError, MethodRefusal, RotorError, shown_value
 from rotor_mbs.methods.base import checked_result
 from rotor_mbs.methods.catalogue import find_method, methods, with_method_files
@@ -323,7 +324,7 @@ def _steady_states(scene: Scene, kind: str, speeds: Array) -> list[_Point | str]
         except InputError as exc:
             points[place] = str(exc)
         except ZeroDivisionError:
-            points[place] = f"{scene.name}: singular at {speed:g} rad/s"
+            points[place] = f"{scene.name}: singular at {speed:g} rad/s ({speed * RPM:.4g} rpm)"
         else:
             start = replace(start, initial_angles=tuple(angles.tolist()))
             torque = holding_torque(scene, speed)

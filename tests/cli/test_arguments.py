@@ -53,6 +53,19 @@ def test_a_value_that_nothing_can_have_is_a_line(words: tuple[str, ...], folder:
 
 
 @pytest.mark.usefixtures("folder")
+def test_limits_of_speeds_are_in_the_unit_that_is_given() -> None:
+    """A rad/s is 30/π = 9.549 rpm."""
+    assert "1e-25 to 1e+25 rad/s; see" in refusal("modes", "paper/fig03", "--speeds", "0:1e30:3")
+    in_rpm = refusal("modes", "paper/fig03", "--rpm", "0:1e30:3")
+    assert "1e-25 to 1e+25 rad/s (9.55e-25 to 9.55e+25 rpm)" in in_rpm
+
+
+@pytest.mark.usefixtures("folder")
+def test_list_says_what_shows_a_file() -> None:
+    assert "allowed: none, or rotor-mbs show my.h5 (a file, scene" in refusal("list", "my.h5")
+
+
+@pytest.mark.usefixtures("folder")
 @pytest.mark.parametrize(
     "words",
     [

@@ -21,6 +21,7 @@ from support.report_pages import (
 )
 from support.sweeps import made_sweep
 
+from rotor_mbs.errors import PlausibilityWarning
 from rotor_mbs.processes.pool import SerialPool
 from rotor_mbs.report.build import write_report
 from rotor_mbs.report.elements import HeatMap
@@ -132,6 +133,18 @@ def test_one_parameter_has_curves_over_it_and_no_map(tmp_path: Path) -> None:
     x, y = plot.curves["runs"]
     np.testing.assert_allclose(x, [1e2, 1e4, 1e6])
     np.testing.assert_allclose(y, np.degrees(stored.column("pitch_max")[()]), rtol=1e-6)
+
+
+def test_a_parameter_of_the_loads_without_loads_is_said_to_change_nothing(tmp_path: Path) -> None:
+    axis = '[[axis]]\nkey = "hub.mass"\nvalues = [0, 1e3]\n'
+    with pytest.warns(PlausibilityWarning):
+        path = made_sweep(tmp_path, HEAD + axis)
+    text = text_of(write_report(path, tmp_path / "out").parent)
+    assert "The hub mass changes nothing: it enters the loads alone, which are no output." in text
+    path.unlink()
+    path = made_sweep(tmp_path, HEAD + 'outputs = ["angles", "loads"]\n' + axis)
+    text = text_of(write_report(path, tmp_path / "out").parent)
+    assert "changes nothing" not in text
 
 
 def test_runs_of_the_printed_equations_are_completed_and_not_ok(tmp_path: Path) -> None:

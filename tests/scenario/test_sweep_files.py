@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rotor_mbs.errors import InputError
+from rotor_mbs.errors import InputError, PlausibilityWarning
 from rotor_mbs.scenario.catalogue import SWEEPS, find_scenes, list_scenes
 from rotor_mbs.scenario.sweep import Axis, Design, Range, Sweep, load_sweep, split_rows, sweep_of
 
@@ -127,6 +127,24 @@ def test_a_row_is_the_scene_with_its_numbers_in_place(tmp_path: Path) -> None:
     assert (scene.gravity, scene.samples, sweep.base.gravity) == (1.5, 11, 1.5)
     assert scene.initial_angles == sweep.base.initial_angles
     assert sweep.units == ("N m/rad", "rad/s", "kg")
+
+
+HUB = """title = "a hub"
+scene = "paper/fig06"
+outputs = {outputs}
+[[axis]]
+key = "hub.mass"
+values = [0, 1e3]
+"""
+
+
+def test_a_key_of_the_loads_without_loads_is_doubted(tmp_path: Path) -> None:
+    """The hub's weight is in the shaft's loads alone."""
+    (tmp_path / "hub.toml").write_text(HUB.format(outputs='["angles"]'))
+    with pytest.warns(PlausibilityWarning, match=r"hub\.mass: changes no run: it enters the loads"):
+        load_sweep(tmp_path / "hub.toml")
+    (tmp_path / "hub.toml").write_text(HUB.format(outputs='["angles", "loads"]'))
+    load_sweep(tmp_path / "hub.toml")  # without a warning, which would be an error here
 
 
 def test_a_scene_is_no_sweep(tmp_path: Path) -> None:

@@ -198,6 +198,12 @@ class _NotFoundError(InputError):
     """Report that no steady state was found."""
 
 
+def _shown(speed: float) -> str:
+    """Return a rotor speed in rad/s, and in rpm, as text."""
+    rpm = f" ({speed * 30.0 / math.pi:.4g} rpm)" if speed else ""
+    return f"{speed:g} rad/s{rpm}"
+
+
 class _Potential(NamedTuple):
     """Hold V - T, and its derivatives by the angles."""
 
@@ -249,7 +255,7 @@ def _stationary(scene: Scene, speed: float, free: slice) -> Array:
             ):
                 break
         angles = trial
-    message = f"no steady state at {speed:g} rad/s found in {_MAX_STEPS} steps from its start"
+    message = f"no steady state at {_shown(speed)} found in {_MAX_STEPS} steps from its start"
     raise _NotFoundError(f"{scene.name}: {message}")
 
 
@@ -282,7 +288,7 @@ def _refuse_large_torques(scene: Scene, form: RotorForm, speed: float, loads: Lo
             if largest:
                 balance = f"gravity and rotation balance at most {largest:g} N m"
             raise InputError(
-                f"{scene.name}: no steady state at {speed:g} rad/s: a torque of {torque:g} N m "
+                f"{scene.name}: no steady state at {_shown(speed)}: a torque of {torque:g} N m "
                 f"acts on pitch {column}, which has no spring, and {balance}"
             )
 
@@ -306,7 +312,7 @@ def _checked(scene: Scene, speed: float, angles: Array) -> Array:
     linear = linearize(scene, angles, rates, holding_torque(scene, speed))
     scale = max(np.abs(linear.stiffness).max(), weight_stiffness(scene, angles))
     if np.abs(linear.residual).max() > 1e-9 * scale:
-        what = f"the steady state at {speed:g} rad/s is not resolved"
+        what = f"the steady state at {_shown(speed)} is not resolved"
         raise InputError(f"{scene.name}: {what}: rounding of the energies")
     return angles
 

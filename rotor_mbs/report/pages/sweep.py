@@ -44,6 +44,7 @@ from rotor_mbs.report.pages import is_wide, words_of
 from rotor_mbs.report.pages.scene_plots import Jumps, blade_look, jumps_of
 from rotor_mbs.runs.rows import text_of
 from rotor_mbs.runs.sweeps import StoredSweep, parameter_name
+from rotor_mbs.scenario.scene import KEYS_OF_LOADS
 from rotor_mbs.solution.quantities import LOADS
 from rotor_mbs.solution.status import GOOD, STATUSES
 
@@ -380,6 +381,11 @@ def sweep_answer(sweep: _Sweep, quantities: Sequence[RunQuantity]) -> list[Marku
             else:
                 text = Markup("{} stays between <b>{} and {}{}</b>").format(name, *ends, unit)
         sentences.append(text + _deciding(sweep, values) + ".")
+    if "shaft_moment" not in sweep.stored.columns:
+        without_effect = [key for key in KEYS_OF_LOADS if key in sweep.varied]
+        for key in without_effect:
+            text = Markup("The {} changes nothing: it enters the loads alone, which are no output.")
+            sentences.append(text.format(field_name(key)))
     return sentences
 
 
