@@ -233,6 +233,9 @@ _SUPERFLUOUS = re.compile(
     r'[^;"]*(; )?',
     re.DOTALL,
 )
+# The commands of a path, and a declaration of a style, each with what is superfluous in it.
+_PATH = re.compile(r'(?<= d=")[^"]*(?=")')
+_STYLE = re.compile(r'(?<= style=")[^"]*(?=")')
 # The name of a marker or a clip area, where it is defined or referred to.
 _NAME = re.compile(r'(id="|="#|\(#)(?=[a-zA-Z]+[0-9a-f]{10})')
 _COLOUR = re.compile(r"#[0-9a-f]{6}\b")
@@ -274,12 +277,29 @@ def inside_of(file: bytes, name: str) -> str:
     _, _, text = text.partition(">")
     text = _SUPERFLUOUS.sub("", text.rpartition("</svg>")[0]).replace("\n", "")
     text = re.sub(r"(\d\.\d)\d+", r"\1", text)
+    text = _PATH.sub(lambda path: _short_path(path[0]), text)
+    text = _STYLE.sub(lambda style: style[0].replace(": ", ":").replace("; ", ";"), text)
 
     def variable(colour: re.Match[str]) -> str:
         known = name_of_colour(colour[0])
         return f"var(--{known})" if known else colour[0]
 
     return _NAME.sub(rf"\g<1>{name}", _COLOUR.sub(variable, text))
+
+
+def _short_path(commands: str) -> str:
+    """Return the commands of a path without spaces, zeros and letters that change nothing.
+
+    "M 1.0 2.0 L 3.5 4.0 L 5.0 6.0 z" becomes "M1 2L3.5 4 5 6z": after L come lines until another
+    letter.
+    """
+    short = re.sub(r"\.0(?=\s|$)", "", commands)
+    parts = re.split(r"\s*([A-Za-z])\s*", short.strip())
+    text = last = ""
+    for letter, numbers in zip(parts[1::2], parts[2::2], strict=True):
+        text += f" {numbers}" if letter == last == "L" else f"{letter}{numbers}"
+        last = letter
+    return text
 
 
 def log_axis(axes: Any, lowest: float, highest: float) -> None:

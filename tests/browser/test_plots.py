@@ -52,6 +52,11 @@ PLOTS = {
     "lines": plot(
         "lines", curve(2.0 * TIME), curve(TIME**2, "two", TWO), marks=[Mark("half", x=5.0)]
     ),
+    "names": plot(
+        "names",
+        *(curve(k * TIME, str(k), beside=f"line {k}") for k in range(5)),
+        curve(200.0 * TIME[:21], "steep", beside="steep"),
+    ),
     "other": plot("other", curve(np.cos(TIME))),
     "constant": plot("constant", curve(np.full(101, 7.0))),
     "zero": plot("zero", curve(np.zeros(101)), least=1e-6),
@@ -346,6 +351,28 @@ def test_zero_is_a_gap_on_a_logarithmic_axis(page: Page, written: Path) -> None:
     assert "NaN" not in path_of(page, "log")
     first = float(re.findall(r"[\d.]+", path_of(page, "log"))[0])
     assert first > box_of(page, "log")["left"] + 1.0  # the sample at 0 s is not drawn
+
+
+def test_names_of_curves_stand_beyond_the_edge_a_line_apart(page: Page, written: Path) -> None:
+    """All five end at 0 to 40 of 4000 rad, within 2 px; that of a curve that ends at 2 s stands
+    there."""
+    opened(page, written)
+    places = page.run(
+        f"[...{find('names')}.querySelectorAll('text.quiet')].map(t => "
+        "[t.textContent, Number(t.getAttribute('x')), Number(t.getAttribute('y'))])"
+    )
+    edge = page.run(
+        "(({x, y, width, height}) => ({x, y, width, height}))"
+        f"({find('names')}.querySelector('.axis').getBBox())"
+    )
+    beyond = [(x, y) for _, x, y in places if x > edge["x"] + edge["width"]]
+    ends = sorted(name for name, *_ in places if name.startswith("line"))
+    assert ends == [f"line {k}" for k in range(5)]
+    assert len(beyond) == 5
+    assert np.diff(sorted(y for _, y in beyond)).min() >= 13.0
+    assert max(y for _, y in beyond) <= edge["y"] + edge["height"] + 5.0
+    (steep,) = (x for name, x, _ in places if name == "steep")
+    assert steep < edge["x"] + 0.3 * edge["width"]
 
 
 def test_a_runaway_is_cut_until_it_is_asked_for(page: Page, written: Path) -> None:

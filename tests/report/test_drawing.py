@@ -16,7 +16,7 @@ from rotor_mbs.report import plots as figures
 from rotor_mbs.report.curves import extremes
 from rotor_mbs.report.elements import Curve, Horizontal, Mark, PageTable, Plot
 from rotor_mbs.report.looks import PALETTE, Look, coordinate_look, look_of
-from rotor_mbs.report.pages.scene_plots import range_of
+from rotor_mbs.report.pages.scene_plots import range_of, settled_range
 from rotor_mbs.report.plots import Series, paths
 from rotor_mbs.report.stills import still
 
@@ -108,6 +108,18 @@ def test_paths_have_equal_scales_and_an_axis_of_stated_length() -> None:
         if len(line.get_xdata()) == 2
     ]
     assert any(np.allclose(span, [0.0, 10.0 * np.cos(np.radians(14.0))]) for span in spans)
+
+
+def test_a_jerk_at_the_start_does_not_fill_a_plot() -> None:
+    """Where it alone makes the range: not a decay over a tenth of the time, nor beside rest."""
+    swing = np.sin(TIME)  # from -1 to 1
+    assert settled_range(TIME, [swing + 20.0 * np.exp(-TIME / 0.1), swing]) == pytest.approx(
+        (-1.5, 1.5), abs=0.1
+    )
+    for other in (swing, swing + 20.0 * np.exp(-TIME), 20.0 * np.exp(-TIME / 0.05), 0.0 * TIME):
+        assert settled_range(TIME, [other]) is None
+    assert settled_range(TIME[:2], [swing[:2]]) is None
+    assert settled_range(TIME, [np.full_like(TIME, np.nan)]) is None
 
 
 # Looks
@@ -234,3 +246,22 @@ def test_a_curve_that_its_range_would_not_show_is_not_cut_off() -> None:
     right = np.sin(TIME)
     assert range_of(right, 1e3 * right) is not None
     assert range_of(right, right + 1e3) is None
+
+
+def points_of(path: str) -> list[tuple[str, list[float]]]:
+    """Each command of an SVG path with its numbers, by the rule of the format: a command without a
+    letter repeats the last one."""
+    sizes = {"M": 2, "L": 2, "C": 6, "Q": 4, "z": 0}
+    commands = []
+    for letter, text in re.findall(r"([A-Za-z])([^A-Za-z]*)", path):
+        given = [float(number) for number in re.findall(r"-?[\d.]+", text)]
+        size = sizes[letter]
+        commands += [(letter, given[i : i + size]) for i in range(0, max(len(given), 1), size or 1)]
+    return commands
+
+
+def test_a_path_of_a_page_is_shorter_and_the_same() -> None:
+    path = "M 1.0 -2.0 L 3.5 40.0 L 5.05 100 C 0.5 2.0 1.0 1.7 1.4 1.4 z M 10.0 0 L 1 0.0 \nz "
+    short = canvas._short_path(path)
+    assert points_of(short) == points_of(path)
+    assert short == "M1 -2L3.5 40 5.05 100C0.5 2 1 1.7 1.4 1.4zM10 0L1 0z"

@@ -271,6 +271,8 @@ def _channel_section(record: Record, verdict: DataVerdict, marks: Sequence[Mark]
         if len(curves) == 2:
             # Data that run away are cut off, so that the reference can be seen.
             clip = draw.range_of(curves[0].y, data)
+        if clip is None and verdict.axis == "time":
+            clip = draw.settled_range(rows, [curve.y for curve in curves])
         state = " · outside the tolerance" if _is_outside(channel, verdict) else ""
         plots.append(
             Plot(

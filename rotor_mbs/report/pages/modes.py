@@ -354,12 +354,17 @@ def _facts(scene: SceneModes) -> list[Fact]:
             ratios = text_range(_shown(low, 3), _shown(high, 3))
             note = "in rotation without gravity, over all speeds"
             facts.append(Fact("Damping ratio", ratios, note))
-    if scene.floquet is not None and np.isfinite(scene.floquet.largest).any():
+    if scene.floquet is not None and _has_multipliers(scene.floquet):
         largest = float(np.nanmax(scene.floquet.largest))
         is_bad = bool((scene.floquet.stable == 0).any())
         note = "of a Floquet multiplier under gravity; above 1 is unstable"
         facts.append(Fact("Largest modulus", number(largest, 6), note, "bad" if is_bad else ""))
     return facts
+
+
+def _has_multipliers(table: FloquetTable) -> bool:
+    """Return whether there are multipliers but those that are 1 for every such motion."""
+    return bool((table.largest[np.isfinite(table.largest)] > 0.0).any())
 
 
 def _scene_sections(scene: SceneModes, name: str, *, with_name: bool) -> list[Section]:
@@ -467,7 +472,8 @@ def _campbell(rotation: LinearModes, name: str, axis_name: str, before: str) -> 
         say += f"Frequencies are in the rotating frame; in the fixed frame, {reason}."
     change = curves(motions.rotating - first, are_named=False)
     least = 1e-9 * _top(motions.rotating)
-    cards.append([Plot("Change from the lowest speed", "Hz", axis, change, 200, least=least)])
+    if _top(motions.rotating - first) > least:
+        cards.append([Plot("Change from the lowest speed", "Hz", axis, change, 200, least=least)])
     section = Section(
         f"{name}-rotation", f"{before}Campbell diagram", [Legend(items), Grid(2, cards)], say
     )
@@ -559,7 +565,7 @@ def _turning(scene: SceneModes, name: str, axis_name: str) -> Section | None:
     axis_name : of the horizontal axis, as for `_campbell`.
     """
     table = scene.floquet
-    if table is None or len(table.speeds) < 2 or not np.isfinite(table.largest).any():
+    if table is None or len(table.speeds) < 2 or not _has_multipliers(table):
         return None
     speeds = table.speeds * RPM
     axis = Horizontal(axis_name, "rpm", "speed", float(speeds[0]), float(speeds[-1]))

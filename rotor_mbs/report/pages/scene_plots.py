@@ -27,6 +27,10 @@ PRINTED_LOOK = Look(INK, "--", "", "as printed")
 # A curve runs away, and is cut off, if it leaves the other's range by so many times that range.
 _RUNAWAY = 2.0
 _LEAST_HEIGHT = 0.5  # rad, rad/s: smallest range in that comparison
+# The start of a motion is cut off if it alone makes the range so many times that of the rest. Where
+# the rest is flat beside it, the start is all that there is to see.
+_START = 0.05  # share of the time
+_START_EXCESS, _FLAT = 3.0, 200.0
 _ROUNDING = 1e-9  # share of the largest component; a smaller one is zero
 LEAST_ANGLE = 1e-6  # rad, rad/s: a smaller range of an angle or a rate is not magnified
 # A value up to this is a gap on a logarithmic axis, as an exact zero is: it is far below the
@@ -133,6 +137,32 @@ def range_of(right: Array, other: Array) -> tuple[float, float] | None:
     if others.max() > high + _RUNAWAY * height or others.min() < low - _RUNAWAY * height:
         return low - height, high + height
     return None
+
+
+def settled_range(time: Array, columns: Sequence[Array]) -> tuple[float, float] | None:
+    """Return the range to which a plot is cut off whose curves jerk at the start; None without.
+
+    A motion that begins beside its equilibrium, as that of a turbine at a given speed does, has
+    loads there that hide all later ones.
+
+    Parameters
+    ----------
+    time : (n,) s, or another quantity that increases.
+    columns : curves (n,) over it. Values that are not finite are ignored.
+    """
+    if len(time) < 3:
+        return None
+    values = np.stack(columns)
+    values = np.where(np.isfinite(values), values, np.nan)
+    late = values[:, time > time[0] + _START * (time[-1] - time[0])]
+    if not np.isfinite(late).any():
+        return None
+    whole = float(np.nanmax(values) - np.nanmin(values))
+    low, high = float(np.nanmin(late)), float(np.nanmax(late))
+    if not high - low < whole / _START_EXCESS or high - low < whole / _FLAT:
+        return None
+    room = 0.25 * (high - low)
+    return low - room, high + room
 
 
 def models_plot(
@@ -288,6 +318,7 @@ class Channel(NamedTuple):
             curves,
             height,
             self.note,
+            clip=settled_range(time, [values for _, _, values in self.curves]),
             marks=marks,
             least=self.floor,
             still=still,

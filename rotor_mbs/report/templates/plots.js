@@ -7,6 +7,7 @@
   const numbers = new Float32Array(bytes.buffer);
   const TOP = 6, RIGHT = 12, BOTTOM = 24;  // px around the curves
   const LETTER = 7.3;                      // px, the width of a digit of 12 px
+  const LINE = 13;                         // px from a line of text to the next
   const DRAG = 6;                          // px: a shorter way of the pointer is a click
   const DENSE = 4;                         // samples a pixel, beyond which smallest and largest are drawn
   const FAR = 1e4;                         // px: curves do not go farther beyond the edge
@@ -119,7 +120,7 @@
       "aria-valuemin": axis.range[0], "aria-valuemax": axis.range[1], "aria-valuenow": axis.range[0] });
     const tip = make(box, "div", "tip"), output = box.querySelector("output"), full = box.querySelector(".full");
     tip.hidden = true;
-    let sx, sy, left = 0, width = 0, shown = [], here = null, cursor = null;
+    let sx, sy, left = 0, right = 0, width = 0, shown = [], here = null, cursor = null;
 
     const extent = () => zooms[axis.name] ?? axis.range;
 
@@ -203,7 +204,8 @@
       const limits = range(from, to), [low, high] = limits;
       const labels = ticks(low, high, plot.log ? 5 : Math.max(2, Math.floor(plot.height / 38)), plot.log);
       left = Math.max(34, 13 + LETTER * Math.max(0, ...labels.map(([, label]) => label.length)));
-      const right = width - RIGHT;
+      const names = ends(to, limits), longest = Math.max(0, ...names.map(([name]) => name.length));
+      right = width - Math.max(RIGHT, longest && 0.9 * LETTER * longest + 8);
       sx = scale(from, to, left, right, axis.log);
       sy = scale(low, high, bottom, TOP, plot.log);
       svg.replaceChildren();
@@ -233,8 +235,9 @@
         if (curve.dots) point(area, curve, from, to);
         if (outside >= 0 && !plot.log) leave(area, curve, outside, limits, top, foot);
       });
-      label(area, shown.filter(({ beside }) => beside), from, to, limits);
-      marks.filter((mark) => mark.text).forEach((mark) => describe(area, mark, right, top));
+      label(area, shown.filter(({ beside }) => beside && !names.some(([name]) => name === beside)), from, to, limits);
+      nameEnds(names);
+      marks.filter((mark) => mark.text).forEach((mark) => describe(area, mark, top));
       draw(svg, "path", { class: "axis", d: `M${left} ${TOP}V${bottom}H${right}` });
       cursor = draw(svg, "g", { class: "cursor" });
       read(here, false);
@@ -247,7 +250,29 @@
       }
     };
 
-    // The texts beside the ends of curves, above or below them where there is room, else left out. Each text is drawn
+    // The texts of curves that reach the right edge within the frame, with the value there.
+    const ends = (to, [low, high]) => shown.filter(({ beside }) => beside).map(({ xs, ys, beside }) => {
+      let i = xs.findIndex((x) => x >= to);
+      if (i < 0 && to - xs[xs.length - 1] <= 1e-6 * Math.abs(to)) i = xs.length - 1;  // single precision
+      const share = i > 0 ? Math.min((to - xs[i - 1]) / (xs[i] - xs[i - 1]), 1) : 1;
+      return [beside, i > 0 ? ys[i - 1] + share * (ys[i] - ys[i - 1]) : ys[i]];
+    }).filter(([, value]) => value >= low && value <= high);
+
+    // They stand beyond the edge, where no curve is, a line of text apart.
+    const nameEnds = (names) => {
+      const placed = names.map(([name, value]) => [name, sy.at(value) + 4]).sort((one, other) => one[1] - other[1]);
+      placed.forEach((place, i) => {
+        if (i) place[1] = Math.max(place[1], placed[i - 1][1] + LINE);
+      });
+      let lowest = bottom + 4;
+      placed.reverse().forEach((place) => {
+        place[1] = Math.min(place[1], lowest);
+        lowest = place[1] - LINE;
+      });
+      placed.forEach(([name, y]) => draw(svg, "text", { class: "quiet", x: right + 6, y }, name));
+    };
+
+    // The texts beside the ends of other curves, above or below them where there is room, else left out. Each text is drawn
     // over all curves.
     const label = (area, curves, from, to, [low, high]) => {
       const boxes = [];
@@ -255,7 +280,7 @@
         let i = ys.length - 1;
         while (i >= 0 && !(xs[i] >= from && xs[i] <= to && ys[i] >= low && ys[i] <= high)) i--;
         if (i < 0) return;
-        const length = LETTER * beside.length, end = Math.min(sx.at(xs[i]), width - RIGHT) - 4;
+        const length = LETTER * beside.length, end = Math.min(sx.at(xs[i]), right) - 4;
         const start = Math.max(end - length, left + 4);
         const isFree = (y) => y - 10 >= TOP && y + 2 <= bottom
           && !boxes.some((box) => Math.abs(box.y - y) < 13 && box.start < start + length && start < box.end);
@@ -279,7 +304,7 @@
       const isAbove = ys[first] > high, known = Array.from(ys).filter(Number.isFinite);
       const end = known.reduce((one, other) => (isAbove ? Math.max(one, other) : Math.min(one, other)));
       const content = `${isAbove ? "▲" : "▼"} ${name}: to ${text(end, 3)}`;
-      const last = width - RIGHT - LETTER * content.length;
+      const last = right - LETTER * content.length;
       const x = Math.max(Math.min(sx.at(xs[first]) + 6, last), left + 6);
       const line = freeLine(isAbove ? top : foot, x, x + LETTER * content.length);
       const y = isAbove ? TOP + 12 + 14 * line : bottom - 6 - 14 * line;
@@ -287,7 +312,7 @@
     };
 
     // The text of a mark; vertical ones in a line of their own where the text before would be covered.
-    const describe = (area, { x, y, text: content }, right, taken) => {
+    const describe = (area, { x, y, text: content }, taken) => {
       if (x === undefined) {
         draw(area, "text", { class: "quiet", x: left + 6, y: Math.max(sy.at(y) - 5, TOP + 12) }, content);
         return;
