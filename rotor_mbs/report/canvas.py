@@ -277,7 +277,7 @@ def inside_of(file: bytes, name: str) -> str:
     _, _, text = text.partition(">")
     text = _SUPERFLUOUS.sub("", text.rpartition("</svg>")[0]).replace("\n", "")
     text = re.sub(r"(\d\.\d)\d+", r"\1", text)
-    text = _PATH.sub(lambda path: _short_path(path[0]), text)
+    text = _PATH.sub(lambda path: short_path(path[0]), text)
     text = _STYLE.sub(lambda style: style[0].replace(": ", ":").replace("; ", ";"), text)
 
     def variable(colour: re.Match[str]) -> str:
@@ -287,7 +287,7 @@ def inside_of(file: bytes, name: str) -> str:
     return _NAME.sub(rf"\g<1>{name}", _COLOUR.sub(variable, text))
 
 
-def _short_path(commands: str) -> str:
+def short_path(commands: str) -> str:
     """Return the commands of a path without spaces, zeros and letters that change nothing.
 
     "M 1.0 2.0 L 3.5 4.0 L 5.0 6.0 z" becomes "M1 2L3.5 4 5 6z": after L come lines until another

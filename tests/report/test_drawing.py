@@ -11,7 +11,7 @@ import pytest
 from support.stored import rotor
 
 from rotor_mbs.methods.catalogue import ladders, method_names
-from rotor_mbs.report import numbers
+from rotor_mbs.report import canvas, numbers
 from rotor_mbs.report import plots as figures
 from rotor_mbs.report.curves import extremes
 from rotor_mbs.report.elements import Curve, Horizontal, Mark, PageTable, Plot
@@ -262,6 +262,6 @@ def points_of(path: str) -> list[tuple[str, list[float]]]:
 
 def test_a_path_of_a_page_is_shorter_and_the_same() -> None:
     path = "M 1.0 -2.0 L 3.5 40.0 L 5.05 100 C 0.5 2.0 1.0 1.7 1.4 1.4 z M 10.0 0 L 1 0.0 \nz "
-    short = canvas._short_path(path)
+    short = canvas.short_path(path)
     assert points_of(short) == points_of(path)
     assert short == "M1 -2L3.5 40 5.05 100C0.5 2 1 1.7 1.4 1.4zM10 0L1 0z"
