@@ -15,7 +15,7 @@ from rotor_mbs.errors import InputError
 from rotor_mbs.report import canvas
 from rotor_mbs.report.looks import GREY, INK, coordinate_look, label_of
 from rotor_mbs.report.pages.viewer import magnification
-from rotor_mbs.report.plots import projected
+from rotor_mbs.report.tip_paths import projected
 from rotor_mbs.runs.output_files import refuse_foreign, replace_file
 from rotor_mbs.runs.read import StoredScene, open_results
 from rotor_mbs.scenario.scene import Scene

@@ -6,22 +6,19 @@ import io
 import logging
 import math
 import os
-import re
 import sys
 from collections.abc import Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
-from html import escape
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from markupsafe import Markup
 from numpy.typing import NDArray
 
 from rotor_mbs.errors import InputError
-from rotor_mbs.report.looks import PAPER, Look, name_of_colour
+from rotor_mbs.report.looks import PAPER, Look
 from rotor_mbs.report.numbers import power
 from rotor_mbs.runs.output_files import replace_file
 from rotor_mbs.scenario.toml_file import file_path
@@ -223,83 +220,6 @@ def encoded(
         stream = io.BytesIO()
         figure.savefig(stream, format=kind, metadata=metadata)
     return stream.getvalue()
-
-
-# Parts of an SVG file that a page does not need: metadata, comments, names of groups,
-# spaces between elements.
-_SUPERFLUOUS = re.compile(
-    r"<metadata>.*?</metadata>|<defs>\s*<style.*?</style>\s*</defs>|<!--.*?-->|(?<=>)\s+(?=<)"
-    r'| id="[a-zA-Z0-9.]+_\d+"| transform="rotate\(-0 [^"]*"|font-size: \d+px; |font-family: '
-    r'[^;"]*(; )?',
-    re.DOTALL,
-)
-# The commands of a path, and a declaration of a style, each with what is superfluous in it.
-_PATH = re.compile(r'(?<= d=")[^"]*(?=")')
-_STYLE = re.compile(r'(?<= style=")[^"]*(?=")')
-# The name of a marker or a clip area, where it is defined or referred to.
-_NAME = re.compile(r'(id="|="#|\(#)(?=[a-zA-Z]+[0-9a-f]{10})')
-_COLOUR = re.compile(r"#[0-9a-f]{6}\b")
-
-
-def path_picture(panels: Panels, name: str, caption: str) -> Markup:
-    """Return a picture of paths for a page, a `figure` element with its caption.
-
-    Parameters
-    ----------
-    panels : the drawing; its backgrounds are made transparent.
-    name : begins the names in the picture; unique on the page.
-    caption : text above the picture.
-    """
-    for patch in (panels.figure.patch, *(axes.patch for axes in panels.figure.axes)):
-        patch.set_visible(False)
-    width, height = (72.0 * size for size in panels.figure.get_size_inches())
-    inside = inside_of(encoded(panels.figure, "svg", for_print=False), re.sub(r"\W+", "-", name))
-    return Markup(
-        f'<figure class="paths"><figcaption>{escape(caption)}</figcaption>'
-        f'<svg viewBox="0 0 {width:g} {height:g}" role="img" '
-        f'aria-label="{escape(caption)}: paths of the tips">{inside}</svg>'
-        "</figure>"
-    )
-
-
-def inside_of(file: bytes, name: str) -> str:
-    """Return what is inside the `svg` element of a file, to be placed in a page.
-
-    Coordinates are rounded to a tenth, and colours of the palette become variables of the style
-    sheet, so that a dark page has its own.
-
-    Parameters
-    ----------
-    file : an SVG file by matplotlib.
-    name : begins the names in it, which must be unique on the page.
-    """
-    _, _, text = file.decode().partition("<svg")
-    _, _, text = text.partition(">")
-    text = _SUPERFLUOUS.sub("", text.rpartition("</svg>")[0]).replace("\n", "")
-    text = re.sub(r"(\d\.\d)\d+", r"\1", text)
-    text = _PATH.sub(lambda path: short_path(path[0]), text)
-    text = _STYLE.sub(lambda style: style[0].replace(": ", ":").replace("; ", ";"), text)
-
-    def variable(colour: re.Match[str]) -> str:
-        known = name_of_colour(colour[0])
-        return f"var(--{known})" if known else colour[0]
-
-    return _NAME.sub(rf"\g<1>{name}", _COLOUR.sub(variable, text))
-
-
-def short_path(commands: str) -> str:
-    """Return the commands of a path without spaces, zeros and letters that change nothing.
-
-    "M 1.0 2.0 L 3.5 4.0 L 5.0 6.0 z" becomes "M1 2L3.5 4 5 6z": after L come lines until another
-    letter.
-    """
-    short = re.sub(r"\.0(?=\s|$)", "", commands)
-    parts = re.split(r"\s*([A-Za-z])\s*", short.strip())
-    text = last = ""
-    for letter, numbers in zip(parts[1::2], parts[2::2], strict=True):
-        text += f" {numbers}" if letter == last == "L" else f"{letter}{numbers}"
-        last = letter
-    return text
 
 
 def log_axis(axes: Any, lowest: float, highest: float) -> None:

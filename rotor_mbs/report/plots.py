@@ -5,7 +5,6 @@ The classes do the same for runs that are in memory, for notebooks and scripts.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -15,8 +14,9 @@ from rotor_mbs.errors import InputError, shown_value
 from rotor_mbs.report import canvas
 from rotor_mbs.report.canvas import TIME_AXIS, Panels
 from rotor_mbs.report.curves import extremes
-from rotor_mbs.report.looks import BLUE, GREY, INK, RING, VERMILLION, Look, coordinate_look, look_of
+from rotor_mbs.report.looks import BLUE, GREY, INK, VERMILLION, Look, coordinate_look, look_of
 from rotor_mbs.report.numbers import prefix_of, with_unit
+from rotor_mbs.report.tip_paths import picture_of
 from rotor_mbs.solution.metrics import angle_error, energy_scale, horizon
 from rotor_mbs.solution.quantities import DEFECT, LOADS, Plot, Quantity
 from rotor_mbs.solution.trajectory import Array, Solution, Trajectory
@@ -34,7 +34,6 @@ _STILL = 10.0
 _ROUNDING = 1e-9
 # Largest number of points of a curve; see `thin`.
 _MAX_POINTS = 4000
-_AZIMUTH, _ELEVATION = np.radians((-62.0, 14.0))  # of the view of paths
 
 
 class Series(NamedTuple):
@@ -244,46 +243,26 @@ def draw_paths(axes: Any, tip: Array, tilt: float = 0.0) -> None:
     tip : (n, blades, 3) m, base frame.
     tilt : of the shaft, rad.
     """
-    reach = 1.04 * float(np.linalg.norm(tip, axis=2).max())
+    reach, lines, texts = picture_of(tip, tilt)
     axes.set(xlim=(-0.95 * reach, 0.95 * reach), ylim=(-1.02 * reach, 1.02 * reach), aspect="equal")
     axes.set_axis_off()
-    angle = np.linspace(0.0, 2.0 * np.pi, 37)
-    ring = reach * np.stack([np.sin(angle), 0.0 * angle, np.cos(angle)], axis=1)
-    shaft = np.array([[0.0, 0.0, 0.0], [0.0, -0.3 * reach, 0.0]])
-    if tilt:
-        turn = np.array(
-            [[1.0, 0.0, 0.0], [0.0, np.cos(tilt), -np.sin(tilt)], [0.0, np.sin(tilt), np.cos(tilt)]]
+    for line in lines:
+        axes.plot(
+            *line.points.T,
+            color=line.colour,
+            linewidth=line.width,
+            linestyle=(0, (3, 2)) if line.dashed else "-",
+            label=line.label or "_",
         )
-        ring, shaft = ring @ turn.T, shaft @ turn.T
-    axes.plot(*projected(ring).T, color=RING, linewidth=0.7)
-    axes.plot(
-        *projected(shaft).T,
-        color=GREY,
-        linewidth=3.0,
-    )
-    ten = 10.0 ** math.floor(math.log10(reach))
-    # The scale: the longest of 1, 2 or 5 times a power of ten within a third of the reach.
-    length = next(step * ten for step in (5.0, 2.0, 1.0, 0.5, 0.2) if reach >= 3.0 * step * ten)
-    corner = np.array([-0.88, -0.86]) * reach
-    for end, name in zip(projected(length * np.eye(3)), "xyz", strict=True):
-        axes.plot(*np.stack([corner, corner + end]).T, color=GREY, linewidth=0.8)
-        axes.text(
-            *(corner + 1.2 * end), name, color=GREY, ha="center", va="center", fontsize="small"
-        )
-    axes.text(
-        *(corner - [0.0, 0.12 * reach]),
-        f"{length:g} m",
-        color=GREY,
-        ha="left",
-        va="center",
-        fontsize="small",
-    )
-    for blade in range(tip.shape[1]):
-        colour, path = coordinate_look(blade + 1).colour, projected(tip[:, blade])
-        axes.plot(*path.T, color=colour, linewidth=0.8, label=f"blade {blade + 1}")
-        for end, dashes, fill in ((path[0], (0, (3, 2)), "white"), (path[-1], "-", colour)):
-            axes.plot((0.0, end[0]), (0.0, end[1]), color=colour, linestyle=dashes, linewidth=1.6)
-            axes.plot(*end[:, None], color=colour, marker="o", markersize=4, markerfacecolor=fill)
+        if line.end:
+            fill = "white" if line.end == "hollow" else line.colour
+            axes.plot(
+                *line.points[-1:].T, color=line.colour, marker="o", markersize=4,
+                markerfacecolor=fill,
+            )  # fmt: skip
+    for place, text in texts:
+        side = "left" if text == texts[-1][1] else "center"
+        axes.text(*place, text, color=GREY, ha=side, va="center", fontsize="small")
     # Lines without points, for the legend alone.
     for dashes, width, label in (
         ("--", 1.6, "blade at the start"),
@@ -291,25 +270,6 @@ def draw_paths(axes: Any, tip: Array, tilt: float = 0.0) -> None:
         ("-", 3.0, "shaft"),
     ):
         axes.plot([], [], color=GREY, linestyle=dashes, linewidth=width, label=label)
-
-
-def projected(points: Array) -> Array:
-    """Project points to the plane of a picture, as seen from far away, above and to the side.
-
-    Parameters
-    ----------
-    points : (n, 3) m, base frame.
-
-    Returns
-    -------
-    (n, 2) ndarray
-        To the right and up, m.
-    """
-    right = np.array([-np.sin(_AZIMUTH), np.cos(_AZIMUTH), 0.0])
-    level = np.array([np.cos(_AZIMUTH), np.sin(_AZIMUTH), 0.0])
-    up = np.array([0.0, 0.0, np.cos(_ELEVATION)]) - np.sin(_ELEVATION) * level
-    seen: Array = points @ np.stack([right, up], axis=1)
-    return seen
 
 
 class ComparisonPlots:

@@ -1,6 +1,6 @@
-"""Draw plots as still pictures, which a page without scripts shows.
+"""Draw still pictures in the classes of the style sheet.
 
-They are drawn as the page's script draws a plot, in the classes of the style sheet.
+They are plots, as the page's script draws them, for pages without scripts, and paths of tips.
 """
 
 from __future__ import annotations
@@ -14,7 +14,9 @@ from markupsafe import Markup
 
 from rotor_mbs.report.curves import extremes
 from rotor_mbs.report.elements import Curve, Plot
+from rotor_mbs.report.looks import name_of_colour
 from rotor_mbs.report.numbers import minus, power, typeset
+from rotor_mbs.report.tip_paths import Line, picture_of
 from rotor_mbs.solution.quantities import Array
 
 _WIDTH = 340  # px, as on a telephone
@@ -195,3 +197,52 @@ def _drawn(
             )
     only = " only" if curve.dots == "only" else ""
     return [f'<path class="curve {curve.look.css}{only}" d="{"".join(line)}"/>', *points]
+
+
+# ---- Paths of the tips
+
+_REACH = 165.0  # px, half of the picture's height
+_APART = 1.5  # px: points of a path that are closer to the last one are left out
+
+
+def path_picture(tip: Array, caption: str) -> Markup:
+    """Return a picture of the paths of tips, a `figure` element with its caption.
+
+    Parameters
+    ----------
+    tip : (n, blades, 3) m, base frame.
+    caption : text above the picture.
+    """
+    reach, lines, texts = picture_of(tip)
+    middle, pixels = np.array([0.95, 1.02]) * _REACH, np.array([1.0, -1.0]) * _REACH / reach
+    parts = [_line_of_path(line, middle + pixels * line.points) for line in lines]
+    for place, text in texts:
+        x, y = middle + pixels * place
+        anchor = "start" if text == texts[-1][1] else "middle"
+        parts.append(f'<text x="{x:.1f}" y="{y + 5:.1f}" text-anchor="{anchor}">{text}</text>')
+    width, height = (2.0 * middle).tolist()
+    return Markup(
+        f'<figure class="paths"><figcaption>{escape(caption)}</figcaption>'
+        f'<svg viewBox="0 0 {width:g} {height:g}" role="img" '
+        f'aria-label="{escape(caption)}: paths of the tips">{"".join(parts)}</svg></figure>'
+    )
+
+
+def _line_of_path(line: Line, points: Array) -> str:
+    """Return the elements of a line, and of the mark at its end.
+
+    Parameters
+    ----------
+    line : how it is drawn.
+    points : (n, 2) px.
+    """
+    length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    _, kept = np.unique(length // _APART, return_index=True)
+    drawn = points[[*kept, len(points) - 1]].tolist()
+    path = " ".join(f"{x:.1f} {y:.1f}" for x, y in drawn)
+    colour, dashes = name_of_colour(line.colour), " dashed" if line.dashed else ""
+    text = f'<path class="curve {colour}{dashes}" style="stroke-width:{line.width:g}" d="M{path}"/>'
+    if line.end:
+        x, y = drawn[-1]
+        text += f'<circle class="{colour} {line.end}" cx="{x:.1f}" cy="{y:.1f}" r="3"/>'
+    return text

@@ -11,7 +11,7 @@ import pytest
 from support.stored import rotor
 
 from rotor_mbs.methods.catalogue import ladders, method_names
-from rotor_mbs.report import canvas, numbers
+from rotor_mbs.report import numbers
 from rotor_mbs.report import plots as figures
 from rotor_mbs.report.curves import extremes
 from rotor_mbs.report.elements import Curve, Horizontal, Mark, PageTable, Plot
@@ -246,22 +246,3 @@ def test_a_curve_that_its_range_would_not_show_is_not_cut_off() -> None:
     right = np.sin(TIME)
     assert range_of(right, 1e3 * right) is not None
     assert range_of(right, right + 1e3) is None
-
-
-def points_of(path: str) -> list[tuple[str, list[float]]]:
-    """Each command of an SVG path with its numbers, by the rule of the format: a command without a
-    letter repeats the last one."""
-    sizes = {"M": 2, "L": 2, "C": 6, "Q": 4, "z": 0}
-    commands = []
-    for letter, text in re.findall(r"([A-Za-z])([^A-Za-z]*)", path):
-        given = [float(number) for number in re.findall(r"-?[\d.]+", text)]
-        size = sizes[letter]
-        commands += [(letter, given[i : i + size]) for i in range(0, max(len(given), 1), size or 1)]
-    return commands
-
-
-def test_a_path_of_a_page_is_shorter_and_the_same() -> None:
-    path = "M 1.0 -2.0 L 3.5 40.0 L 5.05 100 C 0.5 2.0 1.0 1.7 1.4 1.4 z M 10.0 0 L 1 0.0 \nz "
-    short = canvas.short_path(path)
-    assert points_of(short) == points_of(path)
-    assert short == "M1 -2L3.5 40 5.05 100C0.5 2 1 1.7 1.4 1.4zM10 0L1 0z"

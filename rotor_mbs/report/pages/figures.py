@@ -35,6 +35,7 @@ from rotor_mbs.report.paper_figures import (
     available,
     panel_runs,
 )
+from rotor_mbs.report.stills import path_picture
 from rotor_mbs.runs.read import StoredRun
 
 _KINDS = {
@@ -124,7 +125,7 @@ def _figure_section(
         [claim for claim in report.claims if claim.figure == figure.number], with_figure=False
     )
     if figure.kind == PATHS:
-        elements.append(_path_plots(figure.number, pictures))
+        elements.append(_path_plots(pictures))
     else:
         for row in pictures.values():
             elements += _motion_plots(figure, row)
@@ -238,17 +239,12 @@ def _usual_range(
     return range_of(np.concatenate(right), np.concatenate([curve.y for curve in curves]))
 
 
-def _path_plots(number: str, pictures: Mapping[str, Mapping[str, Mapping[str, StoredRun]]]) -> Grid:
+def _path_plots(pictures: Mapping[str, Mapping[str, Mapping[str, StoredRun]]]) -> Grid:
     """Return still pictures of the paths of the tips, one for each model and panel."""
-    from rotor_mbs.report import canvas, plots  # late: matplotlib
-
     cards: list[list[Element]] = []
-    for letter, row in pictures.items():
+    for row in pictures.values():
         for side in SIDES:
             for label, run in row.get(side, {}).items():
                 text = f"({label}) {HEADINGS[side]}" if label else HEADINGS[side]
-                drawn = canvas.path_picture(
-                    plots.paths(run.array("tip")), f"f{number}-{letter}-{side}-", text
-                )
-                cards.append([drawn])
+                cards.append([path_picture(run.array("tip"), text)])
     return Grid(4, cards)
