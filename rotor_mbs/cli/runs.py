@@ -18,8 +18,6 @@ from rotor_mbs.runs.output_files import is_being_written, replace_file
 from rotor_mbs.runs.progress import ProgressLine
 from rotor_mbs.runs.read import open_results
 from rotor_mbs.scenario.catalogue import find_scenes
-from rotor_mbs.studies.reproduce import made_from, summary_of
-from rotor_mbs.studies.reproduce import reproduce as reproduce_paper
 from rotor_mbs.studies.run import run_scenes
 
 
@@ -76,6 +74,8 @@ def reproduce(arguments: argparse.Namespace) -> int:
     int
         The exit status of `print_summary`, or 0 if nothing had to be done.
     """
+    from rotor_mbs.studies.reproduce import made_from  # late, as below: `run` does without benches
+
     start, status = time.monotonic(), 0
     results, pages = arguments.output / "results.h5", arguments.output / "report"
     index, summary, stamp = (pages / name for name in ("index.html", "summary.txt", ".made-from"))
@@ -102,11 +102,14 @@ def reproduce(arguments: argparse.Namespace) -> int:
 def _reproduce(arguments: argparse.Namespace, results: Path, pages: Path) -> tuple[int, str]:
     """Compute the runs, write the pages with the same processes, and return status and summary."""
     load_runs = partial(import_module, "rotor_mbs.studies.reproduce")
+    from rotor_mbs.studies.reproduce import reproduce as reproduce_paper
+    from rotor_mbs.studies.reproduce import summary_of
+
     with local_pool(arguments.jobs, load_runs) as pool, ProgressLine() as progress:
         report, refused = reproduce_paper(
             results, workers=pool, timeout_s=arguments.timeout, on_progress=progress
         )
-        from rotor_mbs.report.build import write_report  # late: matplotlib
+        from rotor_mbs.report.build import write_report  # late, while the workers compute
 
         write_report(results, pages, pool, partial(progress.stage, "pages and figures"))
     return print_summary(report, results, refused), summary_of(results)

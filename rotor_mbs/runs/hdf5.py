@@ -127,6 +127,28 @@ def read_content(
     return read_in_worker(path, _read_content, (kinds, only))
 
 
+def read_arrays(path: Path, group: str, names: Collection[str]) -> dict[str, NDArray[Any]]:
+    """Read a few arrays of a file of this program, as `read_content` reads whole groups.
+
+    Parameters
+    ----------
+    path : the file.
+    group, names : path of a group, and names of its arrays.
+
+    Raises
+    ------
+    StoreError
+        As `read_content`, or if one of them is missing.
+    """
+    return read_in_worker(path, _read_arrays, (group, names))
+
+
+def _read_arrays(path: Path, asked: tuple[str, Collection[str]]) -> dict[str, NDArray[Any]]:
+    group, names = asked
+    with open_file(path) as (file, _), reading(path):
+        return {name: values_of(member(group_at(file, group), name)) for name in names}
+
+
 def _read_content(path: Path, asked: tuple[Collection[str], Collection[str] | None]) -> Content:
     kinds, only = asked
     with open_file(path) as (file, trailer), reading(path):
