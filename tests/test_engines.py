@@ -48,7 +48,7 @@ def test_the_page_of_the_engines_is_drawn_from_the_stored_points(tmp_path: Path)
     # Drake's coarsest settings are already more accurate, the fastest of them takes 14.15 ms; the
     # closed form is interpolated to 77 µs.
     assert "drake/rk5, the fastest of another model, takes 184 times as long" in page
-    assert "No setting of newton/featherstone reaches 10⁻⁶ rad." in page
+    assert "No setting of <b>newton/featherstone</b> reaches 10⁻⁶ rad." in page
 
 
 @pytest.mark.full

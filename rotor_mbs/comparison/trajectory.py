@@ -501,7 +501,7 @@ def _wrong_first_row(
     if off[worst] > 0.0:
         channel, value = errors.channels[worst], compared.values[0, worst]
         right = f"the scene has {rows.expected[0, worst]:.9g}"
-        first = f"{channel.name} {value:.9g} {channel.unit}, {right}"
+        first = f"{channel.name} is {value:.9g} {channel.unit}, {right}"
         yield "inaccurate", f"first row, t = {compared.time[0]:.6g} s: {first}"
 
 
@@ -654,7 +654,7 @@ def _note_on_start(data: ForeignData, rows: ReferencedRows) -> list[str]:
     for j, channel in enumerate(data.channels):
         value, start = rows.data.values[0, j], rows.expected[0, j]
         if abs(value - start) > _SAME_START:
-            different.append(f"{channel.name} {value:.4g} (scene: {start:.4g})")
+            different.append(f"{channel.name}: {value:.4g} (scene: {start:.4g})")
     if not different:
         return []
     start_text = f"initial state differs, in rad and rad/s: {', '.join(different)}"

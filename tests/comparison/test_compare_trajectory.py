@@ -241,7 +241,7 @@ def test_data_without_a_likely_cause_are_told_where_they_start() -> None:
     found = rm.compare({"t": run.time, "angles": np.degrees(run.angles)}, scene)
     assert not found.verdict.likely
     (line,) = (note for note in found.verdict.notes if note.startswith("initial state differs"))
-    assert "rotor 17.19 (scene: 2.88)" in line
+    assert "rotor: 17.19 (scene: 2.88)" in line
     assert "unit?" in line
     same = rm.compare({"t": run.time, "angles": run.angles}, run.scene)
     assert not any("initial state differs" in note for note in same.verdict.notes)

@@ -246,7 +246,7 @@ def test_the_sentence_names_the_fastest_and_how_much_slower_another_model_is() -
 def test_a_method_that_reaches_an_error_at_no_setting_is_named_unless_some_were_left_out() -> None:
     whole = curve("exudyn_tree/rk67", [1e-2, 1e-4], [1e-2, 1e-1])
     third = str(bench_answer({"paper/fig09": [FAST, whole]})[2])
-    assert third == "No setting of Exudyn tree, RK67 reaches 10⁻⁶ rad."
+    assert third == "No setting of <b>Exudyn tree, RK67</b> reaches 10⁻⁶ rad."
     on_one = bench_answer(
         {"paper/fig09": [FAST, whole], "paper/fig11": [replace(whole, arrays=FAST.arrays)]}
     )

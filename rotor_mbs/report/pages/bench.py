@@ -163,7 +163,8 @@ def bench_answer(scenes: Mapping[str, Sequence[Record]]) -> list[Markup]:
         sentences.append(text + ".")
     never = _never_reaching(scenes, 1e-6)
     if never and len(never) <= _NAMES_IN_A_SENTENCE:
-        names = " and ".join(filter(None, (", ".join(never[:-1]), never[-1])))
+        bold = [Markup("<b>{}</b>").format(name) for name in never]  # some have a comma
+        names = Markup(" and ").join(filter(None, (Markup(", ").join(bold[:-1]), bold[-1])))
         text = Markup("No setting of {} reaches 10⁻⁶ rad{}.")
         sentences.append(text.format(names, "" if len(scenes) == 1 else " on any scene"))
     return sentences
@@ -377,7 +378,9 @@ def _reach_table(curves: Sequence[Record]) -> PageTable:
         rows.append(
             [TableCell("not measured", note=", ".join(missing)), *[NOTHING] * (len(table.head) - 2)]
         )
-    return PageTable("Run time to reach an angle error", table.head[1:], rows, sortable=True)
+    targets = [f"Time to {head.removeprefix('s to ')} (s)" for head in table.head[4:]]
+    head = ("Method", "Settings ok", "Best error (rad)", *targets)
+    return PageTable("Run time to reach an angle error", head, rows, wide=(1, 3), sortable=True)
 
 
 def _reach_section(scenes: Mapping[str, Sequence[Record]]) -> Section:

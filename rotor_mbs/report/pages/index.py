@@ -50,6 +50,7 @@ from rotor_mbs.report.pages import (
     paper,
     reproduced,
     status_text,
+    words_of,
 )
 from rotor_mbs.report.pages import scene_plots as draw
 from rotor_mbs.report.pages.scene import HORIZON_NOTE, paper_plots, short_name
@@ -322,7 +323,7 @@ def _departure_cells(scene: StoredScene) -> list[TableCell | str]:
     )
     gain = metric(printed, "energy_gain_J")
     if gain is None:
-        cells.append("")
+        cells.append("" if printed.status in GOOD else TableCell(words_of(printed.status), "bad"))
     elif printed.status not in GOOD:
         cells.append(TableCell("runs away", order=gain))
     elif created_energy(scene) is None:

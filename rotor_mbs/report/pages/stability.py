@@ -89,10 +89,11 @@ def _ranking(compared: Sequence[SuiteRun], methods: Sequence[str]) -> list[Marku
         good[run.method] += run.outcome == "ok"
     best = max(good.values())
     names = [label_of(method) for method in methods if good[method] == best]
-    text = Markup("<b>{}</b> {} ok on <b>{} of {} scenes</b> at default settings, the most.")
+    text = Markup("<b>{}</b> {} ok on <b>{} of {} scenes</b> at default settings{}.")
+    comment = ", the most" if len(methods) > 1 else ""
     verb = "is" if len(names) == 1 else "are"
     which = with_capital(" and ".join(names[:3]))
-    sentences = [text.format(which, verb, best, max(counts.values()))]
+    sentences = [text.format(which, verb, best, max(counts.values()), comment)]
     # By the share: not every method has run every scene.
     worst = min(methods, key=lambda method: good[method] / max(counts[method], 1))
     if good[worst] < best:

@@ -132,9 +132,13 @@ class _Sweep:
         """Return the parameters of a grid, slowest first; none where the runs are no grid."""
         return self.varied if len(self.stored.shape) == len(self.keys) else []
 
+    def value(self, key: str, value: float) -> str:
+        """Return a parameter in words with a value and its unit: "blade mass 1000 kg"."""
+        return f"{field_name(key)} {brief(value)} {self.unit(key)}".rstrip()
+
     def described(self, run: int) -> str:
         """Return the values of a run's parameters in words."""
-        parts = [f"{field_name(key)} {brief(self.parameters[key][run])}" for key in self.varied]
+        parts = [self.value(key, self.parameters[key][run]) for key in self.varied]
         if len(self.stored.methods) > 1:
             parts.append(self.stored.methods[int(self.codes[run])])
         return ", ".join(parts)
@@ -411,7 +415,7 @@ def common_values(sweep: _Sweep, runs: NDArray[np.int64]) -> str:
     for key in sweep.varied:
         own = np.unique(sweep.parameters[key][runs])
         if len(own) == 1:
-            parts.append(f"{field_name(key)} {brief(own[0])}")
+            parts.append(sweep.value(key, own[0]))
     return " and ".join(parts)
 
 

@@ -237,7 +237,7 @@
       });
       label(area, shown.filter(({ beside }) => beside && !names.some(([name]) => name === beside)), from, to, limits);
       nameEnds(names);
-      marks.filter((mark) => mark.text).forEach((mark) => describe(area, mark, top));
+      marks.filter((mark) => mark.text).forEach((mark) => describe(area, mark, top, foot));
       draw(svg, "path", { class: "axis", d: `M${left} ${TOP}V${bottom}H${right}` });
       cursor = draw(svg, "g", { class: "cursor" });
       read(here, false);
@@ -312,15 +312,22 @@
     };
 
     // The text of a mark; vertical ones in a line of their own where the text before would be covered.
-    const describe = (area, { x, y, text: content }, taken) => {
+    const describe = (area, { x, y, text: content }, top, foot) => {
       if (x === undefined) {
         draw(area, "text", { class: "quiet", x: left + 6, y: Math.max(sy.at(y) - 5, TOP + 12) }, content);
         return;
       }
       const length = LETTER * content.length, isLeft = sx.at(x) + length > right;
       const from = isLeft ? sx.at(x) - length : sx.at(x);
-      const line = freeLine(taken, from, from + length);
-      const place = { x: sx.at(x) + (isLeft ? -5 : 5), y: TOP + 12 + 14 * line, "text-anchor": isLeft ? "end" : "start" };
+      // At the foot where curves cross the text at the top and none does there.
+      const isCrossed = (y) => shown.some(({ xs, ys }) => xs.some((value, i) => {
+        const px = sx.at(value);
+        return px >= from && px <= from + length && Math.abs(sy.at(ys[i]) - y) < 9;
+      }));
+      const isBelow = isCrossed(TOP + 8) && !isCrossed(bottom - 10);
+      const line = freeLine(isBelow ? foot : top, from, from + length);
+      const height = isBelow ? bottom - 6 - 14 * line : TOP + 12 + 14 * line;
+      const place = { x: sx.at(x) + (isLeft ? -5 : 5), y: height, "text-anchor": isLeft ? "end" : "start" };
       draw(area, "text", { class: "quiet", ...place }, content);
     };
 
