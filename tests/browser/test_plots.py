@@ -57,6 +57,9 @@ PLOTS = {
         *(curve(k * TIME, str(k), beside=f"line {k}") for k in range(5)),
         curve(200.0 * TIME[:21], "steep", beside="steep"),
     ),
+    "clip together": plot(
+        "clip together", curve(5.0 * TIME), curve(5.0 * TIME, "two", TWO), clip=(0.0, 2.0)
+    ),
     "other": plot("other", curve(np.cos(TIME))),
     "constant": plot("constant", curve(np.full(101, 7.0))),
     "zero": plot("zero", curve(np.zeros(101)), least=1e-6),
@@ -380,6 +383,7 @@ def test_a_runaway_is_cut_until_it_is_asked_for(page: Page, written: Path) -> No
     assert "▼ second: to −2.2×10⁴" in labels(page, "clip") or "▼ second: to −22000" in labels(
         page, "clip"
     )
+    assert "▲ first, second: to 50" in labels(page, "clip together")
     page.run(f"{find('clip')}.querySelector('.full').click()")
     assert not [text for text in labels(page, "clip") if text.startswith("▼")]
     assert page.run(f"{find('clip')}.querySelector('.full').getAttribute('aria-pressed')") == "true"

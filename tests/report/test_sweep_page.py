@@ -62,6 +62,8 @@ def test_a_sweep_opens_with_counts_and_what_its_parameters_do(
     stored, text = grid
     assert sections_of(text)[:2] == ["map", "slices"]
     assert answer_of(text).startswith("All 6 runs are ok.")
+    place = r"at bearing stiffness \S+ N m/rad, bearing damping \S+ N m s/rad"
+    assert re.search(place, answer_of(text))
     assert facts_of(text)["Runs that are ok"] == "6 of 6"
     assert "The axis is logarithmic: runs at 0 are in the map." in section_of(text, "slices")
     assert facts_of(text)["Bearing stiffness"] == "0 to 10⁵ N m/rad | 3 values"

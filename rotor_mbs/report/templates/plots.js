@@ -228,13 +228,15 @@
         draw(area, "path", { class: "mark", d });
       });
       const top = [], foot = [];  // of the texts at the upper and at the lower edge, the ends of each
+      const leaving = [];
       shown.forEach((curve) => {
         const { path, outside } = trace(curve, from, to, limits);
         const only = curve.dots === "only" ? " only" : "";
         draw(area, "path", { class: `curve ${curve.style}${only}`, d: path });
         if (curve.dots) point(area, curve, from, to);
-        if (outside >= 0 && !plot.log) leave(area, curve, outside, limits, top, foot);
+        if (outside >= 0 && !plot.log) leaving.push({ ...curve, first: outside });
       });
+      leave(area, leaving, limits, top, foot);
       label(area, shown.filter(({ beside }) => beside && !names.some(([name]) => name === beside)), from, to, limits);
       nameEnds(names);
       marks.filter((mark) => mark.text).forEach((mark) => describe(area, mark, top, foot));
@@ -299,16 +301,23 @@
       return line;
     };
 
-    // A curve that leaves the range says how far it goes.
-    const leave = (area, { xs, ys, name }, first, [, high], top, foot) => {
-      const isAbove = ys[first] > high, known = Array.from(ys).filter(Number.isFinite);
-      const end = known.reduce((one, other) => (isAbove ? Math.max(one, other) : Math.min(one, other)));
-      const content = `${isAbove ? "▲" : "▼"} ${name}: to ${text(end, 3)}`;
-      const last = right - LETTER * content.length;
-      const x = Math.max(Math.min(sx.at(xs[first]) + 6, last), left + 6);
-      const line = freeLine(isAbove ? top : foot, x, x + LETTER * content.length);
-      const y = isAbove ? TOP + 12 + 14 * line : bottom - 6 - 14 * line;
-      draw(area, "text", { class: "quiet", x, y }, content);
+    // A curve that leaves the range says how far it goes; those that go equally far say so together.
+    const leave = (area, curves, [, high], top, foot) => {
+      const said = new Map();
+      curves.forEach(({ xs, ys, name, first }) => {
+        const isAbove = ys[first] > high, known = Array.from(ys).filter(Number.isFinite);
+        const end = known.reduce((one, other) => (isAbove ? Math.max(one, other) : Math.min(one, other)));
+        const far = `to ${text(end, 3)}`, others = said.get(`${isAbove} ${far}`);
+        if (others) others.names.push(name);
+        else said.set(`${isAbove} ${far}`, { isAbove, far, names: [name], start: sx.at(xs[first]) });
+      });
+      said.forEach(({ isAbove, far, names, start }) => {
+        const content = `${isAbove ? "▲" : "▼"} ${names.join(", ")}: ${far}`, length = LETTER * content.length;
+        const x = Math.max(Math.min(start + 6, right - length), left + 6);
+        const line = freeLine(isAbove ? top : foot, x, x + length);
+        const y = isAbove ? TOP + 12 + 14 * line : bottom - 6 - 14 * line;
+        draw(area, "text", { class: "quiet", x, y }, content);
+      });
     };
 
     // The text of a mark; vertical ones in a line of their own where the text before would be covered.
