@@ -109,7 +109,7 @@ def _reproduce(arguments: argparse.Namespace, results: Path, pages: Path) -> tup
         report, refused = reproduce_paper(
             results, workers=pool, timeout_s=arguments.timeout, on_progress=progress
         )
-        from rotor_mbs.report.build import write_report  # late, while the workers compute
+        from rotor_mbs.report.build import write_report  # late: `reproduce` alone needs it
 
         write_report(results, pages, pool, partial(progress.stage, "pages and figures"))
     return print_summary(report, results, refused), summary_of(results)
