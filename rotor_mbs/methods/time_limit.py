@@ -248,7 +248,7 @@ class _Signals:
         try:
             if sys.unraisablehook is not _on_unraisable:
                 self._hook, sys.unraisablehook = sys.unraisablehook, _on_unraisable
-            for number in signal.valid_signals():
+            for number in _SIGNALS:
                 handler = signal.getsignal(number)
                 # one that is not Python's could not be set again
                 if number == _ALARM and handler is not None:
@@ -470,6 +470,7 @@ def _passing(error: BaseException) -> BaseException:
 
 _signals = _Signals()
 _ALARM: int = getattr(signal, "SIGALRM", 0)  # 0 is no signal: on Windows
+_SIGNALS = tuple(signal.valid_signals())
 
 
 def _on_alarm(_number: int, frame: FrameType | None) -> None:

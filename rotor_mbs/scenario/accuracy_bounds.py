@@ -79,9 +79,9 @@ class Bounds:
     def find(self, check: str, method: str) -> Bound | None:
         """Return the bound of a check of a method, or None where there is none."""
         for bound in self.entries:
-            patterns = bound.scenes.split("|")
-            is_of_scene = any(fnmatchcase(self.scene, pattern) for pattern in patterns)
-            if is_of_scene and bound.check == check and fnmatchcase(method, bound.method):
+            if bound.check != check or not fnmatchcase(method, bound.method):
+                continue
+            if any(fnmatchcase(self.scene, pattern) for pattern in bound.scenes.split("|")):
                 return bound
         return None
 

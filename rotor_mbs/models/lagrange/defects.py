@@ -314,6 +314,8 @@ def interval_ends(
     segments = scene.load_segments
     advance, max_steps = integration or _integration_of(scene, states.shape[1])
     reached_states = states.astype(float)
+    # Not asked of each state in the loop, where it would take as long as a step.
+    is_finite = np.asarray(np.isfinite(states).all(axis=1))
     place = 0
     for k, (state, begin, end) in enumerate(
         zip(states, begins.tolist(), ends.tolist(), strict=True)
@@ -322,17 +324,19 @@ def interval_ends(
         reached = begin
         while place + 1 < len(segments) and segments[place].end <= reached:
             place += 1
-        part, steps = place, 0
-        while reached < end and np.isfinite(state).all():
+        part, steps, is_there = place, 0, bool(is_finite[k])
+        while reached < end and is_there:
             # Data may go on after the scene's end, with the last loads.
             until = min(segments[part].end, end) if part + 1 < len(segments) else end
             state, taken = advance(segments[part], reached, until, state, max_steps)
             reached, part, steps = until, part + 1, steps + taken
-        is_there = bool(np.isfinite(state).all())
-        reached_states[k] = state if is_there else np.nan
+            if reached < end:
+                is_there = bool(np.isfinite(state).all())
+        reached_states[k] = state
         # See _FEWEST_STEPS.
-        if steps >= _FEWEST_STEPS and not is_there:
+        if steps >= _FEWEST_STEPS and not np.isfinite(state).all():
             max_steps = max(max_steps // 2, _FEWEST_STEPS)
+    reached_states[~np.isfinite(reached_states).all(axis=1)] = np.nan
     return reached_states
 
 
@@ -368,6 +372,7 @@ def _advance_by_taylor(scene: Scene, count: int) -> _Advance:
     )
     integrator = propagation.integrator
     state = integrator.state
+    has_work = len(state) > count
     entered: list[Segment] = []
 
     def advance(
@@ -378,11 +383,12 @@ def _advance_by_taylor(scene: Scene, count: int) -> _Advance:
             propagation.set_segment(segment)
         integrator.time = start
         state[:count] = values
-        state[count:] = 0.0  # the work, where it is a variable
+        if has_work:
+            state[count:] = 0.0
         _, _, _, steps, *_ = integrator.propagate_until(end, max_steps=max_steps)
         if integrator.time != end:  # too many steps, or not finite: what comes after it is neither
             state[:count] = np.nan
-        return np.array(state[:count]), steps
+        return state[:count].copy(), steps
 
     return advance
 

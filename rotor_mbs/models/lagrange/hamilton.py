@@ -113,6 +113,7 @@ def forces(
     return [moment, *of_pitches]
 
 
+@functools.lru_cache(maxsize=16)
 def resting_pitches(scene: Scene) -> tuple[int, ...]:
     """Return the coordinates of the pitches that the equations always leave at zero.
 

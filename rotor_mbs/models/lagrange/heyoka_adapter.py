@@ -93,16 +93,17 @@ class Parameters:
     def __init__(self) -> None:
         self.values: list[Fraction] = []
         self.structure: list[int] = []
-        self._known: dict[Fraction, int] = {}
+        self._known: dict[tuple[int, int], int] = {}  # a fraction's own hash is slow
 
     def __call__(self, value: Fraction) -> Any:
         if value == 0:
             self.structure.append(-1)
             return 0.0
-        if value not in self._known:
-            self._known[value] = len(self.values)
+        key = value.numerator, value.denominator
+        if key not in self._known:
+            self._known[key] = len(self.values)
             self.values.append(value)
-        return self._parameter(self._known[value])
+        return self._parameter(self._known[key])
 
     def own(self, value: Fraction) -> Any:
         """Return a parameter that no other number shares, even if zero or equal to another.

@@ -56,9 +56,28 @@ def build_system(
     MethodRefusal
         If heyoka is not installed.
     """
-    engine = heyoka()
     parameters = Parameters()
-    form, loads, work_per_joule = equation_numbers(scene, parameters)
+    numbers = equation_numbers(scene, parameters)
+    return symbolic_equations(scene, *numbers, in_momenta=in_momenta), parameters
+
+
+def symbolic_equations(
+    scene: Scene,
+    form: RotorForm,
+    loads: LoadValues,
+    work_per_joule: Any,
+    *,
+    in_momenta: bool = False,
+) -> list[tuple[Any, Any]]:
+    """Return the equations of `build_system` from the numbers of a scene.
+
+    Parameters
+    ----------
+    scene : the run.
+    form, loads, work_per_joule : as of `equation_numbers`.
+    in_momenta : as of `build_system`.
+    """
+    engine = heyoka()
     angles, others = state_symbols(form)
     if in_momenta:
         rates = hamilton.rates(angles, others, form, engine.sin, engine.cos)
@@ -71,7 +90,7 @@ def build_system(
         working = at_constant_rests(changing_rests(scene), loads)
         power = closed_form.power(rates, form, working)
         equations.append((engine.make_vars("work"), work_per_joule * power))
-    return equations, parameters
+    return equations
 
 
 def state_symbols(form: RotorForm) -> tuple[list[Any], list[Any]]:
@@ -189,24 +208,32 @@ class Propagation:
         engine, self._scene = heyoka(), scene
         columns = scene.moving_coordinates
         count = 2 * len(columns)
-        equations, parameters = build_system(scene)
+        size = count + int(scene.work_needs_path)
+        parameters = Parameters()
+        numbers = equation_numbers(scene, parameters)
         self._changing = changing_loads(scene)
-        structure = (*parameters.structure, len(equations), *self._changing)
+        structure = (*parameters.structure, size, *self._changing)
         values = [scene.initial_angles[i] for i in columns] + [
             scene.initial_rates[i] for i in columns
         ]
-        values += [0.0] * (len(equations) - count)  # the work, where it is a variable
+        values += [0.0] * (size - count)  # the work, where it is a variable
         start = array_of([Fraction(value) for value in values], quad=quad)
         # What the compiled code depends on.
         key = (quad, variational, *options.items(), structure)
         if quad:
             options |= {"tol": engine.real128(options["tol"]), "fp_type": engine.real128}
         if variational:
-            equations, start = equations[:count], start[:count]
-            equations = engine.var_ode_sys(equations, args=engine.var_args.vars, order=1)
-        self.integrator = compiled(
-            key, lambda: engine.taylor_adaptive(equations, state=start, **options), self
-        )
+            start = start[:count]
+
+        def make() -> Any:
+            equations: Any = symbolic_equations(scene, *numbers)
+            if variational:
+                equations = engine.var_ode_sys(
+                    equations[:count], args=engine.var_args.vars, order=1
+                )
+            return engine.taylor_adaptive(equations, state=start, **options)
+
+        self.integrator = compiled(key, make, self)
         set_parameters(self.integrator, array_of(parameters.values, quad=quad))
         self._initial = np.concatenate([start, np.eye(count).ravel()]) if variational else start
         self._segments = scene.load_segments
