@@ -91,6 +91,7 @@ class System:
         except _engine.ExudynError as exc:
             raise MethodRefusal(f"Exudyn rejected this model: {_one_line(str(exc))}") from exc
         self._initial_state = self._mbs.systemData.GetSystemState(_engine.ConfigurationType.Initial)
+        self._sensor_numbers = [self._numbers[Ref("sensor", name)] for name in self.sensors]
 
     def _argument(self, key: str, value: Any) -> object:
         """Return an argument as the engine takes it: numbers of parts, and its own types."""
@@ -363,8 +364,10 @@ class System:
         if len(turns):
             data.SetDataCoordinates(turns, where)
 
-    def read(self, time: float, values: Array, turns: Array) -> dict[str, Array]:
-        """Return the readings of all sensors at a state, by the sensors' names.
+    def read(self, time: float, values: Array, turns: Array) -> list[Any]:
+        """Return the readings of all sensors at a state, in the order of `sensors`.
+
+        A sensor gives a number or an array.
 
         Parameters
         ----------
@@ -375,11 +378,7 @@ class System:
         data.SetTime(time, current)
         self._set(values, turns, current)
         data.SetAECoordinates(values[3 * data.ODE2Size() :], current)
-        readings = {}
-        for name in self.sensors:
-            number = self._numbers[Ref("sensor", name)]
-            readings[name] = np.array(self._mbs.GetSensorValues(number), dtype=float, ndmin=1)
-        return readings
+        return [self._mbs.GetSensorValues(number) for number in self._sensor_numbers]
 
     def _solve(self, solver: Any, settings: Any, stages: int, total: Integration) -> str:
         """Run the solver from start to end time; return why it failed, or "".

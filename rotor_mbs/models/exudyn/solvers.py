@@ -354,12 +354,15 @@ class ExtrapolatedSolver:
 
         At a jump of a load they are read under the load before it.
         """
-        tables: dict[str, list[Array]] = {name: [] for name in self.system.sensors}
+        readings = []
         for kept in self.kept:
             self._loads.set_segment(kept.interval.segment)
-            for name, read in self.system.read(kept.time, kept.values, kept.turns).items():
-                tables[name].append(np.concatenate([[kept.time], read]))
-        rows = {name: np.array(table) for name, table in tables.items()}
+            readings.append(self.system.read(kept.time, kept.values, kept.turns))
+        time = np.array([kept.time for kept in self.kept])
+        rows = {
+            name: np.column_stack([time, [reading[i] for reading in readings]])
+            for i, name in enumerate(self.system.sensors)
+        }
         rows["work"] = np.array([[kept.time, kept.work] for kept in self.kept])
         # A diverging state may overflow in its energies; the rows are cut where they stop being
         # finite.
