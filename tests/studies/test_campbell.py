@@ -11,8 +11,11 @@ import pytest
 from support.runs import run
 from support.scenes import AXIAL, general, make_scene
 
+import rotor_mbs as rm
 from rotor_mbs.analysis.modes import campbell_table, mode_summary, read_modes, to_records
 from rotor_mbs.analysis.whirl import FixedFrame
+from rotor_mbs.report.files import render
+from rotor_mbs.report.pages.modes import modes_page
 from rotor_mbs.runs.read import write_records
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.studies.modes import compute_modes
@@ -216,3 +219,12 @@ def test_the_file_has_both_frames_and_the_table_has_hz_over_rpm(tmp_path):
     per_rev = frame.fixed[1, 3] / SPEED
     expected = [SPEED * 60.0 * hertz, frame.rotating[1, 3] * hertz, frame.fixed[1, 3] * hertz]
     assert shown == pytest.approx([*expected, per_rev], rel=1e-5)
+
+
+def test_a_page_has_no_plot_of_what_a_rotor_without_free_pitches_has_not():
+    """Its rotor turns freely at any speed: no frequency changes, no multiplier but those of 1."""
+    held = compute_modes(rm.scene("turbine/uae-overspeed"), [0.0, 2.0, 3.0])
+    text = render(modes_page([held]))
+    assert "Rotating frame" in text
+    assert "Change from the lowest speed" not in text
+    assert "Modulus of the multipliers" not in text

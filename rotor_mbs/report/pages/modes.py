@@ -472,7 +472,7 @@ def _campbell(rotation: LinearModes, name: str, axis_name: str, before: str) -> 
         say += f"Frequencies are in the rotating frame; in the fixed frame, {reason}."
     change = curves(motions.rotating - first, are_named=False)
     least = 1e-9 * _top(motions.rotating)
-    if _top(motions.rotating - first) > least:
+    if np.nanmax(np.abs(motions.rotating - first), initial=0.0) > least:
         cards.append([Plot("Change from the lowest speed", "Hz", axis, change, 200, least=least)])
     section = Section(
         f"{name}-rotation", f"{before}Campbell diagram", [Legend(items), Grid(2, cards)], say

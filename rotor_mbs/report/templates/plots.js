@@ -205,7 +205,7 @@
       const labels = ticks(low, high, plot.log ? 5 : Math.max(2, Math.floor(plot.height / 38)), plot.log);
       left = Math.max(34, 13 + LETTER * Math.max(0, ...labels.map(([, label]) => label.length)));
       const names = ends(to, limits), longest = Math.max(0, ...names.map(([name]) => name.length));
-      right = width - Math.max(RIGHT, longest && 0.9 * LETTER * longest + 8);
+      right = width - Math.max(RIGHT, longest && LETTER * longest + 8);
       sx = scale(from, to, left, right, axis.log);
       sy = scale(low, high, bottom, TOP, plot.log);
       svg.replaceChildren();
@@ -323,7 +323,8 @@
     // The text of a mark; vertical ones in a line of their own where the text before would be covered.
     const describe = (area, { x, y, text: content }, top, foot) => {
       if (x === undefined) {
-        draw(area, "text", { class: "quiet", x: left + 6, y: Math.max(sy.at(y) - 5, TOP + 12) }, content);
+        const at = sy.at(y) < TOP + 17 ? sy.at(y) + 14 : sy.at(y) - 5;  // below a mark at the upper edge
+        draw(area, "text", { class: "quiet", x: left + 6, y: at }, content);
         return;
       }
       const length = LETTER * content.length, isLeft = sx.at(x) + length > right;
