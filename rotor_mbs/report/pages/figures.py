@@ -55,8 +55,6 @@ _NOTES = {
     "known, 10 and 50 kN m were chosen.",
 }
 SIDES = (PRINTED_SIDE, CORRECTED)
-# Samples of a curve here, where a plot is at most 620 px wide; a scene's own page has all.
-_SAMPLES = 500
 
 
 def figures_page(report: Report) -> PageContent:
@@ -193,9 +191,6 @@ def _motion_plots(
             curves = []
             for place, (label, run) in enumerate(row.get(side, {}).items()):
                 values, time = run.array(name), run.array("time")
-                shown = np.arange(0, len(time), max(1, len(time) // _SAMPLES))
-                shown = np.union1d(shown, max(len(time) - 1, 0))  # the last one, too
-                values, time = values[shown], time[shown]
                 if figure.kind == TORQUES:
                     look = step_look(place, len(row[side]), label)
                     curves.append(Curve(label, look, time, values[:, 0]))
