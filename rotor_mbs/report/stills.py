@@ -202,7 +202,9 @@ def _drawn(
 # ---- Paths of the tips
 
 _REACH = 165.0  # px, half of the picture's height
-_APART = 1.5  # px: points of a path that are closer to the last one are left out
+# px: points of a path that are closer to the last one are left out. The chord of an arc of the largest
+# circle is then 0.01 px from it.
+_APART = 3.0
 
 
 def path_picture(tip: Array, caption: str) -> Markup:
