@@ -38,7 +38,7 @@ EXIT_OK, EXIT_FAILED, EXIT_BAD_INPUT, EXIT_INTERRUPTED = 0, 1, 2, 130
 # failure.
 _ONLY_PRINT = ("list", "show")
 
-_received_signals: list[int] = []  # that this call was to end by
+_received_signals: list[int] = []  # those that have interrupted the current call
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -55,7 +55,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     if argv is not None:
         return _run(list(argv))
-    # Python would show a traceback of the exit and ask for input, also in worker processes.
+    # With this variable Python would show the exit as a traceback and wait for input at the end,
+    # also in worker processes, which inherit it.
     is_inspected = bool(os.environ.pop("PYTHONINSPECT", ""))
     try:
         status = _run(sys.argv[1:])
@@ -89,13 +90,14 @@ def _run(words: list[str]) -> int:
             with _signals_as_interrupts(), warnings.catch_warnings(), system_errors_apart():
                 warnings.simplefilter("always", PlausibilityWarning)
                 warnings.showwarning = _print_warning
-                # Loaded here: an interrupt, or a lack of memory, while code is loaded ends the
-                # command in the same way as later.
+                # Imported in this block: an interrupt, or a lack of memory, during the import is
+                # handled like one during the command.
                 from rotor_mbs.cli.arguments import load_methods, parse
 
                 arguments = parse(words)
                 load_methods(arguments)
                 _prepare_reading(arguments)
+                # `command` is "module:function", see `parse`.
                 module, _, function = arguments.command.partition(":")
                 command = getattr(importlib.import_module(f"rotor_mbs.cli.{module}"), function)
                 status = int(command(arguments))
@@ -112,11 +114,8 @@ def _run(words: list[str]) -> int:
                 return EXIT_INTERRUPTED
             if isinstance(exc, RotorError):
                 print_line(str(exc), sys.stderr)
-                return (
-                    EXIT_BAD_INPUT
-                    if isinstance(exc, InputError | MethodRefusal | StoreError)
-                    else EXIT_FAILED
-                )
+                is_bad_input = isinstance(exc, InputError | MethodRefusal | StoreError)
+                return EXIT_BAD_INPUT if is_bad_input else EXIT_FAILED
             # If memory lacks for a library, its import raises a SystemError or an ImportError.
             print_line(f"code cannot be loaded: {type(exc).__name__}: {exc}", sys.stderr)
             return EXIT_FAILED
@@ -124,16 +123,17 @@ def _run(words: list[str]) -> int:
             print_line(f"not enough memory: {exc}" if str(exc) else "not enough memory", sys.stderr)
             return EXIT_FAILED
         except BrokenPipeError:
-            return EXIT_OK if words[:1] and words[0] in _ONLY_PRINT else EXIT_FAILED
+            only_prints = bool(words) and words[0] in _ONLY_PRINT
+            return EXIT_OK if only_prints else EXIT_FAILED
         except OSError as exc:
             print_line(f"{exc.filename or 'standard output'}: {exc.strerror or exc}", sys.stderr)
             return EXIT_BAD_INPUT if exc.filename else EXIT_FAILED
 
 
 def _prepare_reading(arguments: argparse.Namespace) -> None:
-    """Start the process that reads the file named in the arguments, if it is one of this program.
+    """Start the reading process of `runs.untrusted` if an argument names a file of this program.
 
-    It starts while the command's code is loaded.
+    It loads its code while this process loads that of the command.
 
     Parameters
     ----------
@@ -153,9 +153,9 @@ def _prepare_reading(arguments: argparse.Namespace) -> None:
 
 @contextmanager
 def _without_invalid_date() -> Iterator[None]:
-    """Remove a SOURCE_DATE_EPOCH that is no number from the environment in the block.
+    """Remove a SOURCE_DATE_EPOCH that is not a number from the environment in the block.
 
-    With it, a part of NumPy could not be loaded, nor SciPy.
+    With it, SciPy and a part of NumPy cannot be imported.
     """
     date = os.environ.get("SOURCE_DATE_EPOCH")
     if date is None or date.isdecimal():
@@ -169,18 +169,22 @@ def _without_invalid_date() -> Iterator[None]:
 
 
 def _print_warning(message: Warning | str, category: type[Warning], *where: Any, **_: Any) -> None:
-    """Print a warning: implausible numbers of a file in one line, others as Python shows them."""
-    is_doubt = issubclass(category, PlausibilityWarning)
-    text = (
-        f"warning: {message}" if is_doubt else warnings.formatwarning(message, category, *where[:2])
-    )
+    """Print a warning: a PlausibilityWarning in one line, others as Python shows them.
+
+    It has the parameters of `warnings.showwarning`; `where` begins with file name and line number.
+    """
+    if issubclass(category, PlausibilityWarning):
+        text = f"warning: {message}"
+    else:
+        text = warnings.formatwarning(message, category, *where[:2])
     print_line(text.rstrip(), sys.stderr)
 
 
 def _is_interrupt(error: BaseException) -> bool:
     """Return whether an error was caused by an interrupt.
 
-    Inside compiled code, or while it is loaded, an interrupt becomes another error, or its cause.
+    An interrupt inside compiled code or during an import may arrive as another error, with or
+    without the interrupt as its cause.
     """
     cause: BaseException | None = error
     while cause is not None:
@@ -193,12 +197,12 @@ def _is_interrupt(error: BaseException) -> bool:
 def _signal_main_thread(number: signal.Signals) -> None:
     """Send a signal to the main thread, and break off its system call, such as a sleep."""
     if not callable(signal.getsignal(number)):
-        return  # the command has ended meanwhile: by default the signal would end its caller
+        return  # the command has ended: the default action of the signal would end its caller
     if hasattr(signal, "pthread_kill"):
         main = threading.main_thread().ident
         assert main is not None  # it has started
         signal.pthread_kill(main, number)
-    else:  # Windows; what the main thread waits for goes on
+    else:  # Windows: a system call of the main thread is not broken off
         _thread.interrupt_main(number)
 
 
@@ -222,12 +226,15 @@ def _signals_as_interrupts() -> Iterator[None]:
         Python ignores exceptions in a weak reference's callback, for example.
         """
         if isinstance(unraisable.exc_value, KeyboardInterrupt):
-            number = signal.Signals((_received_signals or [signal.SIGINT])[-1])
+            number = signal.SIGINT
+            if _received_signals:
+                number = signal.Signals(_received_signals[-1])
             threading.Timer(0.01, _signal_main_thread, [number]).start()
         else:
-            hook(unraisable)
+            earlier_hook(unraisable)
 
-    hook, sys.unraisablehook = sys.unraisablehook, interrupt_again
+    earlier_hook = sys.unraisablehook
+    sys.unraisablehook = interrupt_again
     _received_signals.clear()
     handlers = {}
     for name in ("SIGINT", "SIGTERM", "SIGHUP"):
@@ -241,7 +248,7 @@ def _signals_as_interrupts() -> Iterator[None]:
     try:
         yield
     finally:
-        sys.unraisablehook = hook
+        sys.unraisablehook = earlier_hook
         for number, handler in handlers.items():
             signal.signal(number, handler)
 
@@ -277,6 +284,7 @@ class PlainStream:
 
     @contextmanager
     def _kept_failure(self) -> Iterator[None]:
+        """Note the first OSError of the block in `failure`, and drop all that is written later."""
         try:
             yield
         except OSError as exc:

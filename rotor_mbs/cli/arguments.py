@@ -21,10 +21,10 @@ from rotor_mbs.scenario.toml_file import file_path
 REPRODUCED = Path("rotor-mbs-out")  # where `reproduce` writes
 EXPORT_FORMATS = ("mjcf", "exudyn", "csv")
 
-_MIN_SPEED, _MAX_SPEED = 1e-25, 1e25  # rad/s, as of numbers in a scene
+_MIN_SPEED, _MAX_SPEED = 1e-25, 1e25  # rad/s, the limits of numbers in a scene
 _SPEED_UNITS = {"rad/s": 1.0, "rpm": math.pi / 30.0}
 _MAX_SPAN = 10_000  # numbers of FROM:TO:COUNT
-_MAX_NUMBER = 1e9  # of a count; of seconds: thirty years
+_MAX_NUMBER = 1e9  # largest count, and largest number of seconds (thirty years)
 
 
 def default_results() -> Path:
@@ -147,11 +147,13 @@ def setting(text: str) -> tuple[str, object]:
 def _positive(
     kind: type[int] | type[float], allowed: str, largest: float = _MAX_NUMBER
 ) -> Callable[[str], float]:
+    """Return a function that reads an argument as a number above 0, at most `largest`."""
+
     def read(text: str) -> float:
         try:
             value = kind(text)
-        except ValueError:  # also a whole number of more than 4300 digits
-            value = kind(0)
+        except ValueError:  # no number, or a whole number of more than 4300 digits
+            value = kind(0)  # which is refused below
         if not 0 < value <= largest:
             raise _not_allowed(text, allowed)
         return value
@@ -180,11 +182,12 @@ class _Parser(argparse.ArgumentParser):
     def flag(self, *names: str, help: str) -> None:
         self.add_argument(*names, action="store_true", help=help)
 
-    # What several commands have.
+    # Arguments that several commands have.
 
     def scenes(self, **options: Any) -> None:
         text = "a name (paper/fig05), a folder (paper) or a TOML file"
-        self.add_argument("scenes", metavar="SCENE", **{"nargs": "+", "help": text} | options)
+        options = {"nargs": "+", "help": text} | options
+        self.add_argument("scenes", metavar="SCENE", **options)
 
     def method(
         self, help: str = "method (see rotor-mbs list), or a Python file that defines methods"
@@ -301,21 +304,24 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
 
         Parameters
         ----------
-        name, text : of the command, and its description.
+        name : of the command.
+        text : its description.
         function : "module:function" in `rotor_mbs.cli`.
         *examples : arguments that may follow the name.
         """
-        lines = ["example:", *(f"  rotor-mbs {name} {example}".rstrip() for example in examples)]
-        own = commands.add_parser(
+        lines = ["example:"]
+        for example in examples:
+            lines.append(f"  rotor-mbs {name} {example}".rstrip())
+        options = commands.add_parser(
             name, help=text, description=text, epilog="\n".join(lines), formatter_class=formatter
         )  # fmt: skip
-        own.set_defaults(command=function)
-        return own
+        options.set_defaults(command=function)
+        return options
 
-    own = command("list", "list scenes, sweeps and methods", "commands:list_all", "", "--json")
-    own.flag("--json", help="print JSON")
+    options = command("list", "list scenes, sweeps and methods", "commands:list_all", "", "--json")
+    options.flag("--json", help="print JSON")
 
-    own = command(
+    options = command(
         "show",
         "show a scene and its methods, the settings of a method, or what is in a file",
         "commands:show",
@@ -327,22 +333,24 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
         "a scene (paper/fig05), a TOML file, a method (lagrange/taylor, mine.py), or a file of "
         "results (results.h5)"
     )
-    own.add_argument("scene", metavar="NAME", help=what)
-    own.flag("--build", help="also list the items that each model builds")
-    own.flag("--json", help="print JSON")
+    options.add_argument("scene", metavar="NAME", help=what)
+    options.flag("--build", help="also list the items that each model builds")
+    options.flag("--json", help="print JSON")
 
-    own = command(
+    options = command(
         "new", "write a commented scene file to start from", "commands:new",
         "my.toml", "mine.toml --from paper/fig11", "mine.toml --from MODEL.fst",
     )  # fmt: skip
-    own.add_argument("file", type=file, metavar="FILE", help="a TOML file that does not exist yet")
+    options.add_argument(
+        "file", type=file, metavar="FILE", help="a TOML file that does not exist yet"
+    )
     text = (
         "a scene (paper/fig11) or a TOML file to copy, or an OpenFAST model (MODEL.fst) to make a "
         "scene of"
     )
-    own.add_argument("--from", dest="source", metavar="SOURCE", help=text)
+    options.add_argument("--from", dest="source", metavar="SOURCE", help=text)
 
-    own = command(
+    options = command(
         "reproduce",
         (
             "run every scene of the paper with the default methods and with each erratum alone, "
@@ -352,25 +360,25 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
         "",
         "-o out -j 4",
     )
-    own.output(folder, "DIR", REPRODUCED)
-    own.jobs()
-    own.timeout()
+    options.output(folder, "DIR", REPRODUCED)
+    options.jobs()
+    options.timeout()
 
-    own = command(
+    options = command(
         "run", "run scenes with one or more methods and store the results in a file", "runs:run",
         "my.toml -o my.h5", "paper/fig11 -m lagrange/taylor -m exudyn_tree/rk67 --set step=1e-3",
     )  # fmt: skip
-    own.scenes()
-    own.method(
+    options.scenes()
+    options.method(
         "method (see rotor-mbs list), or a Python file that defines methods (default: selected for "
         "each scene)"
     )
-    own.settings()
-    own.output(file, "FILE", Path("results.h5"))
-    own.jobs()
-    own.timeout()
+    options.settings()
+    options.output(file, "FILE", Path("results.h5"))
+    options.jobs()
+    options.timeout()
 
-    own = command(
+    options = command(
         "compare",
         (
             "compare another program's trajectory, loads or modes with a scene; exit status 1 if "
@@ -384,99 +392,105 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
         "text with a header, .json, .npz, .mat, HDF5, netCDF, an Exudyn sensor file, OpenFAST .out "
         "or .outb"
     )
-    own.add_argument("data", type=path, metavar="DATA", help=text)
-    own.add_argument(
+    options.add_argument("data", type=path, metavar="DATA", help=text)
+    options.add_argument(
         "--scene", required=True, metavar="SCENE", help="a name (paper/fig05) or a TOML file"
     )
     text = (
         "mapping file: column, unit, sign and offset of channels that are not known by name (see "
         "docs/compare.md)"
     )
-    own.add_argument("--columns", type=path, metavar="MAP.toml", help=text)
+    options.add_argument("--columns", type=path, metavar="MAP.toml", help=text)
     text = (
         "bound (rad) on interval defects (the equations of motion integrated from each row to the "
         "next, minus the next row) and on errors divided by the error growth; for loads and "
         "frequencies a relative bound (default: %(default)g)"
     )
-    own.add_argument("--tolerance", type=POSITIVE, default=1e-6, metavar="X", help=text)
+    options.add_argument("--tolerance", type=POSITIVE, default=1e-6, metavar="X", help=text)
     text = "time limit for the reference in s (default: %(default)g)"
-    own.add_argument("--timeout", type=SECONDS, default=600.0, metavar="SECONDS", help=text)
-    own.output(folder, "DIR", Path("comparison"), "output folder (default: %(default)s)")
-    own.flag("--json", help="print the verdict as JSON")
-    own.add_argument(
+    options.add_argument("--timeout", type=SECONDS, default=600.0, metavar="SECONDS", help=text)
+    options.output(folder, "DIR", Path("comparison"), "output folder (default: %(default)s)")
+    options.flag("--json", help="print the verdict as JSON")
+    options.add_argument(
         "--names", action=_Names, nargs=0, help="print the names that columns may have, and end"
     )
 
-    own = command(
+    options = command(
         "bench",
         "measure error and run time of each method at several tolerances or steps",
         "commands:bench",
         "paper/fig11",
         "paper/fig11 my.toml -m lagrange/taylor -m exudyn_tree/rk67 -o bench.h5",
     )
-    own.scenes()
-    own.method("method (see rotor-mbs list), or a Python file that defines methods (default: all)")
-    own.output(file, "FILE", Path("bench.h5"))
+    options.scenes()
+    options.method(
+        "method (see rotor-mbs list), or a Python file that defines methods (default: all)"
+    )
+    options.output(file, "FILE", Path("bench.h5"))
     text = "timed runs per point (default: %(default)s; at most 5 for runs over 0.5 s)"
-    own.add_argument("--repeats", type=COUNT, default=20, metavar="N", help=text)
+    options.add_argument("--repeats", type=COUNT, default=20, metavar="N", help=text)
     # At this default the paper's seventeen scenes take eight minutes.
     text = "time budget per scene in s (default: %(default)g)"
-    own.add_argument("--budget", type=SECONDS, default=28.0, metavar="SECONDS", help=text)
+    options.add_argument("--budget", type=SECONDS, default=28.0, metavar="SECONDS", help=text)
 
-    own = command(
+    options = command(
         "reference",
         "recompute quad-precision references",
         "runs:reference",
         "paper/fig08 -o reference.h5",
     )
-    own.scenes()
-    own.add_argument("-o", "--output", type=file, required=True, metavar="FILE", help="output file")
-    own.jobs()
-    own.timeout()
+    options.scenes()
+    options.add_argument(
+        "-o", "--output", type=file, required=True, metavar="FILE", help="output file"
+    )
+    options.jobs()
+    options.timeout()
 
-    own = command(
+    options = command(
         "check",
         "check the accuracy of stored runs; exit status 1 if a check fails",
         "verdicts:check",
         "",
         "rotor-mbs-out/results.h5 --junit check.xml",
     )
-    own.add_argument(
+    options.add_argument(
         "file",
         nargs="?",
         type=path,
         metavar="FILE",
         help="file to check (default: compute a set of runs)",
     )
-    own.method("method to compute if no FILE is given, or a Python file that defines methods")
-    own.add_argument(
+    options.method("method to compute if no FILE is given, or a Python file that defines methods")
+    options.add_argument(
         "--bounds",
         type=path,
         metavar="TOML",
         help="bounds that take precedence over reference/accuracy.toml",
     )
     text = "fail if a scene of FILE has no run with this method; may be repeated"
-    own.add_argument("--require", action="append", metavar="METHOD", help=text)
+    options.add_argument("--require", action="append", metavar="METHOD", help=text)
     text = (
         "also fail if, compared with this earlier file, a margin has shrunk more than tenfold, a "
         "run is missing or a scene was changed"
     )
-    own.add_argument("--against", type=path, metavar="OLD", help=text)
-    own.flag(
+    options.add_argument("--against", type=path, metavar="OLD", help=text)
+    options.flag(
         "--allow-changed", help="tell what changed in scenes since OLD, and do not fail for it"
     )
-    own.add_argument("--junit", type=file, metavar="XML", help="write the verdicts as JUnit XML")
-    own.add_argument(
+    options.add_argument(
+        "--junit", type=file, metavar="XML", help="write the verdicts as JUnit XML"
+    )
+    options.add_argument(
         "--json",
         type=file,
         metavar="FILE",
         help="write the verdicts as JSON; - for standard output",
     )
-    own.flag("--github", help="print the ten worst failures as annotations")
-    own.flag("-v", "--verbose", help="print verdicts that pass, too")
-    own.jobs()
+    options.flag("--github", help="print the ten worst failures as annotations")
+    options.flag("-v", "--verbose", help="print verdicts that pass, too")
+    options.jobs()
 
-    own = command(
+    options = command(
         "test-method",
         (
             "test a method, your own or a built-in one, and report faults with their most likely "
@@ -486,72 +500,76 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
         "./mine.py",
         "lagrange/dop853 --json -",
     )
-    own.add_argument(
+    options.add_argument(
         "methods",
         nargs="+",
         metavar="METHOD",
         help="a method (see rotor-mbs list), or a Python file",
     )
-    own.add_argument("--junit", type=file, metavar="XML", help="write the checks as JUnit XML")
-    own.add_argument(
+    options.add_argument("--junit", type=file, metavar="XML", help="write the checks as JUnit XML")
+    options.add_argument(
         "--json",
         type=file,
         metavar="FILE",
         help="write the checks as JSON; - for standard output",
     )
-    own.timeout()
+    options.timeout()
 
-    own = command(
+    options = command(
         "sweep", "run a parameter study and store it in one dataset", "commands:sweep",
         "sweeps/fig11-spread -o spread.h5", "my-sweep.toml --dry-run",
     )  # fmt: skip
-    own.add_argument(
+    options.add_argument(
         "file",
         type=path,
         metavar="SWEEP.toml",
         help="a file, or a shipped sweep (sweeps/fig11-spread)",
     )
-    own.method("method to use instead of those in the file")
-    own.output(file, "FILE", help="output file (default: name of the sweep with .h5)")
-    own.flag("--metadata", help="also write Croissant metadata beside FILE, as JSON")
+    options.method("method to use instead of those in the file")
+    options.output(file, "FILE", help="output file (default: name of the sweep with .h5)")
+    options.flag("--metadata", help="also write Croissant metadata beside FILE, as JSON")
     text = "also write a folder for Hugging Face datasets: a file per split and a dataset card"
-    own.add_argument("--datasets", type=path, metavar="DIR", help=text)
-    own.add_argument(
+    options.add_argument("--datasets", type=path, metavar="DIR", help=text)
+    options.add_argument(
         "--engine",
         default="local",
         metavar="ENGINE",
         help="local (default), or dask:tcp://HOST:PORT",
     )
-    own.add_argument(
+    options.add_argument(
         "--part",
         type=part,
         default=(1, 1),
         metavar="K/N",
         help="compute part K of N, for a job array",
     )
-    own.flag("--fresh", help="recompute all stored runs")
-    own.flag("--dry-run", help="only print number of runs and disk space")
-    own.flag("--json", help="print the summary or the estimate as JSON")
-    own.jobs()
-    own.timeout()
+    options.flag("--fresh", help="recompute all stored runs")
+    options.flag("--dry-run", help="only print number of runs and disk space")
+    options.flag("--json", help="print the summary or the estimate as JSON")
+    options.jobs()
+    options.timeout()
 
-    own = command(
+    options = command(
         "stability",
         "run stiff and extreme scenes with every method and report which are stable and accurate",
         "commands:stability",
         "",
         "stiff/bearing-1e8 -o stiff.h5",
     )
-    own.scenes(nargs="*", help="names of scenes, folders or TOML files (default: stiff extreme)")
-    own.method("method (see rotor-mbs list), or a Python file that defines methods (default: all)")
-    own.settings()
-    own.output(file, "FILE", Path("stability.h5"))
-    own.jobs()
-    own.timeout(
+    options.scenes(
+        nargs="*", help="names of scenes, folders or TOML files (default: stiff extreme)"
+    )
+    options.method(
+        "method (see rotor-mbs list), or a Python file that defines methods (default: all)"
+    )
+    options.settings()
+    options.output(file, "FILE", Path("stability.h5"))
+    options.jobs()
+    options.timeout(
         8.0, "; at least 120 for lagrange/taylor"
     )  # many runs of the suite would reach any limit: with a short one it ends in minutes
 
-    own = command(
+    options = command(
         "modes",
         (
             "compute natural frequencies at rest and over rotor speed, and Floquet multipliers "
@@ -560,76 +578,76 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
         "commands:modes",
         "stiff/nrel-5mw --speeds 0:3:31",
     )
-    own.scenes()
-    own.method(
+    options.scenes()
+    options.method(
         "method, or a Python file, whose model is compared with the closed form (default: all)"
     )
-    either = own.add_mutually_exclusive_group()
+    either = options.add_mutually_exclusive_group()
     text = "rotor speeds in rad/s, equally spaced, such as 0:3:31 (default: only at rest)"
     either.add_argument("--speeds", type=span, default=(), metavar="FROM:TO:COUNT", help=text)
     text = "the same in rpm, such as 0:30:31"
     either.add_argument(
         "--rpm", type=span_in_rpm, dest="speeds", metavar="FROM:TO:COUNT", help=text
     )
-    own.output(file, "FILE", Path("modes.h5"))
-    own.flag("--json", help="print the table as JSON")
-    own.jobs()
-    own.timeout(
+    options.output(file, "FILE", Path("modes.h5"))
+    options.flag("--json", help="print the table as JSON")
+    options.jobs()
+    options.timeout(
         600.0,
         text="time limit per scene in s; the modes of a scene that takes longer are not stored",
     )
 
-    own = command(
+    options = command(
         "report",
         "write HTML pages from a results, bench, sweep, modes or comparison file",
         "commands:report",
         "my.h5 --open",
     )
-    own.results()
+    options.results()
     text = "folder for the pages (default: NAME-report beside NAME.h5; report beside results.h5)"
-    own.output(folder, "DIR", help=text)
-    own.flag("--open", help="open the index in a browser")
+    options.output(folder, "DIR", help=text)
+    options.flag("--open", help="open the index in a browser")
 
-    own = command(
+    options = command(
         "figures",
         "draw the paper's figures for a manuscript, from a results file",
         "commands:figures",
         "--format svg --figure 11",
     )
-    own.results()
-    own.output(folder, "DIR", Path("figures"))
-    own.add_argument(
+    options.results()
+    options.output(folder, "DIR", Path("figures"))
+    options.add_argument(
         "--format",
         choices=("pdf", "svg", "png"),
         default="pdf",
         help="format (default: %(default)s)",
     )
-    own.add_argument(
+    options.add_argument(
         "--figure", action="append", metavar="N", help="only this figure; may be repeated"
     )
 
-    own = command(
+    options = command(
         "animate", "animate a scene from a results file", "commands:animate",
         "paper/fig11", "my my.h5 -o my.gif",
     )  # fmt: skip
-    own.add_argument("scene", metavar="SCENE", help="name of a scene in the results file")
-    own.results()
+    options.add_argument("scene", metavar="SCENE", help="name of a scene in the results file")
+    options.results()
     text = "FILE.gif or FILE.webp (default: name of the scene with .webp)"
-    own.output(file, "FILE", help=text)
+    options.output(file, "FILE", help=text)
     text = (
         "magnification of the tip's distance from its pitch axis (default: scaled to 10 %% of "
         "blade length)"
     )
-    own.add_argument("--offset", type=POSITIVE, metavar="TIMES", help=text)
+    options.add_argument("--offset", type=POSITIVE, metavar="TIMES", help=text)
 
-    own = command(
+    options = command(
         "export", "export a scene for MuJoCo or Exudyn, or its reference as CSV", "commands:export",
         "paper/fig11 --to mjcf", "my.toml --to csv -o my.csv",
     )  # fmt: skip
-    own.add_argument("scene", metavar="SCENE", help="a name (paper/fig05) or a TOML file")
+    options.add_argument("scene", metavar="SCENE", help="a name (paper/fig05) or a TOML file")
     text = "mjcf: MuJoCo model; exudyn: stand-alone Exudyn script; csv: reference trajectory"
-    own.add_argument("--to", required=True, choices=EXPORT_FORMATS, metavar="FORMAT", help=text)
-    own.output(
+    options.add_argument("--to", required=True, choices=EXPORT_FORMATS, metavar="FORMAT", help=text)
+    options.output(
         file,
         "FILE",
         help="output file (default: name of the scene with .xml, -exudyn.py or .csv)",

@@ -41,7 +41,8 @@ def run(arguments: argparse.Namespace) -> int:
     InputError
         If no scene has a method that can run it.
     """
-    scenes, settings = find_scenes(arguments.scenes, problems_of_scene), dict(arguments.set or ())
+    scenes = find_scenes(arguments.scenes, problems_of_scene)
+    settings = dict(arguments.set or ())
     methods, reasons, refused = selected_methods(scenes, arguments.method, settings)
     for reason in reasons:
         print(reason, file=sys.stderr)
@@ -76,12 +77,13 @@ def reproduce(arguments: argparse.Namespace) -> int:
     """
     from rotor_mbs.studies.reproduce import made_from  # late, as below: `run` does without benches
 
-    start, status = time.monotonic(), 0
+    start = time.monotonic()
+    status = 0
     results, pages = arguments.output / "results.h5", arguments.output / "report"
-    index, summary, stamp = (pages / name for name in ("index.html", "summary.txt", ".made-from"))
-    there = results.is_file() and index.is_file() and summary.is_file() and stamp.is_file()
+    index, summary, stamp = pages / "index.html", pages / "summary.txt", pages / ".made-from"
+    has_outputs = all(path.is_file() for path in (results, index, summary, stamp))
     if (
-        there
+        has_outputs
         and stamp.read_text() == made_from(results, arguments.timeout)
         and not is_being_written(results)
     ):

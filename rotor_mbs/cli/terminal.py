@@ -17,7 +17,7 @@ from rotor_mbs.runs.progress import coloured
 from rotor_mbs.scenario.keys import counted
 from rotor_mbs.solution.status import REFUSED
 
-if TYPE_CHECKING:  # a sweep's workers load their code meanwhile
+if TYPE_CHECKING:  # imported late, so that a sweep's workers start before
     from rotor_mbs.analysis.text_tables import TextTable
     from rotor_mbs.runs.runner import RunOutcome
     from rotor_mbs.studies.run import BatchReport
@@ -51,7 +51,7 @@ def print_summary(report: BatchReport, output: Path, refused: Sequence[Refusal] 
     ----------
     report : what the call computed, and what was stored already.
     output : the results file.
-    refused : runs that were left out before.
+    refused : runs that were left out before the call began.
 
     Returns
     -------
@@ -60,21 +60,24 @@ def print_summary(report: BatchReport, output: Path, refused: Sequence[Refusal] 
         methods refused all runs.
     """
     is_incomplete = print_not_computed(report.computed, refused)
-    made = [run for run in report.computed if run.status != REFUSED]
-    counts = Counter(run.status if run.is_stored else "not computed" for run in made)
-    parts = [f"{count} {status}" for status, count in counts.most_common()]
-    text = f"{counted(len(made), 'run')} computed ({', '.join(parts)})" if made else "nothing to do"
+    computed = [run for run in report.computed if run.status != REFUSED]
+    counts = Counter(run.status if run.is_stored else "not computed" for run in computed)
+    text = "nothing to do"
+    if computed:
+        parts = [f"{count} {status}" for status, count in counts.most_common()]
+        text = f"{counted(len(computed), 'run')} computed ({', '.join(parts)})"
     text += f", {len(report.stored)} already stored"
-    not_run = len(refused) + len(report.computed) - len(made)
+    not_run = len(refused) + len(report.computed) - len(computed)
     if not_run:
         text += f", {not_run} not run"
     print(f"{output}: {text}")
     for line in report.stored_failures:
         print(f"stored: {line}", file=sys.stderr)
-    methods = [run.method for run in made] + [run.method for run in report.stored]
-    if not_run and all(method == REFERENCE for method in methods):
+    if not_run and all(run.method == REFERENCE for run in [*computed, *report.stored]):
         return EXIT_BAD_INPUT
-    return EXIT_FAILED if report.failures or is_incomplete or report.stored_failures else EXIT_OK
+    if is_incomplete or report.failures or report.stored_failures:
+        return EXIT_FAILED
+    return EXIT_OK
 
 
 def print_not_computed(made: Sequence[RunOutcome], refused: Sequence[Refusal] = ()) -> bool:

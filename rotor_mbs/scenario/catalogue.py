@@ -37,7 +37,7 @@ for _folder in (SCENARIOS, REFERENCES):
     if not _folder.is_dir():
         raise RotorError(f"{_folder}: the folder is missing; install rotor_mbs again")
 
-# Mappings of columns beside scene files: a folder's TOML files but for these are scenes.
+# How mapping files of columns end; every other TOML file in a folder is a scene.
 MAPPING_ENDING = ".columns.toml"
 _NO_MOTION = ("samples", "outputs")  # keys that change what is stored, not how the rotor moves
 _SHOWN_CHANGES = 3  # keys in the label of a changed scene
@@ -77,9 +77,9 @@ def find_scenes(arguments: Sequence[str], check: ValuesCheck | None = None) -> l
 
     Parameters
     ----------
-    arguments : names of scenes, folders, and paths of TOML files. A shipped name goes before a
-        path; write ./paper for a folder of one's own.
-    check : what else is wrong with the values of a file.
+    arguments : names of scenes, folders, and paths of TOML files. A shipped name takes precedence
+        over a path: ./paper is a folder of one's own.
+    check : called with the values of each file, returns further problems of them.
 
     Returns
     -------
@@ -141,8 +141,9 @@ def _name_problem(
 
     Parameters
     ----------
-    path, name : of the file; that its scene would have.
-    by_name : files of other scenes of the call.
+    path : the scene's file.
+    name : the name that the scene would have.
+    by_name : files of the call's other scenes, by name of the scene.
     shipped : names of shipped scenes.
     """
     if name in by_name:
@@ -153,13 +154,15 @@ def _name_problem(
     # A results file has one group for `paper` and the scenes in it.
     is_folder = any(other.startswith(name + "/") for other in shipped)
     if name in RESERVED_GROUPS or is_folder:
-        hint = f"; of a sweep: rotor-mbs sweep {shown_path(path)}" if name == "sweep" else ""
+        hint = ""
+        if name == "sweep":
+            hint = f"; of a sweep: rotor-mbs sweep {shown_path(path)}"
         return f"{name} is a reserved name in results files; allowed: another file name{hint}"
     return ""
 
 
 def check_scene_name(path: Path) -> None:
-    """Raise InputError if a scene cannot be named after the file `path`, whether there is one."""
+    """Raise InputError if no scene can be named after `path`, a file that need not exist."""
     problem = _name_problem(path, path.stem, {}, _shipped())
     if problem:
         raise InputError(f"{shown_path(path)}: {problem}")
@@ -168,7 +171,7 @@ def check_scene_name(path: Path) -> None:
 def only_scene(argument: str) -> Scene:
     """Return the one scene that an argument means.
 
-    Raises InputError where it means several, and as `find_scenes`.
+    Raises InputError if it means several, and for whatever `find_scenes` refuses.
     """
     scenes = find_scenes([argument])
     if len(scenes) != 1:
@@ -180,7 +183,7 @@ def only_scene(argument: str) -> Scene:
 def scene_of(given: Scene | str | os.PathLike[str]) -> Scene:
     """Return the scene itself, or the one that a name or the path of a TOML file means.
 
-    Raises InputError where there is none, TypeError for what is no scene, text or path.
+    Raises InputError if there is none, TypeError if `given` is neither a scene nor a text or path.
     """
     from rotor_mbs.scenario.scene import Scene
 
@@ -188,7 +191,7 @@ def scene_of(given: Scene | str | os.PathLike[str]) -> Scene:
 
 
 def shipped_scene(name: str) -> Scene | None:
-    """Return the scene of this package with a name, None without; no file of a user's is read."""
+    """Return the shipped scene of a name, or None; files of users are not read."""
     from rotor_mbs.scenario.scene import load_scene
 
     path = _shipped().get(name)
@@ -227,7 +230,7 @@ def label_with_changes(name: str, changes: Iterable[SceneChange]) -> str:
 
 
 def moves_as_shipped(changes: Iterable[SceneChange] | None) -> bool:
-    """Return whether a scene has the motion of the shipped one; `changes` as of it."""
+    """Return whether a scene moves as the shipped one, given its `changes_from_shipped`."""
     return changes is not None and all(change.path[0] in _NO_MOTION for change in changes)
 
 
@@ -243,7 +246,7 @@ def _shipped() -> dict[str, Path]:
 def _title(path: Path) -> str:
     """Return the title of a shipped file."""
     text = path.read_text(encoding="utf-8")
-    # All of its tables come after the title, and reading them would take most of the time.
+    # The title stands before the first table; to parse the tables would take most of the time.
     top = text.partition("\n[")[0]
     return str(parse_toml(top, str(path)).tables.get("title", ""))
 
@@ -296,5 +299,6 @@ def _files(argument: str) -> list[Path]:
         what = f"no such scene{hint}; allowed: a name from `rotor-mbs list`, or FILE.toml"
     quoted = ascii(argument[:80])
     if argument.isprintable():
-        quoted = f"'{argument if len(argument) <= 80 else argument[:77] + '...'}'"
+        shown = argument if len(argument) <= 80 else f"{argument[:77]}..."
+        quoted = f"'{shown}'"
     raise InputError(f"{quoted}: {what}")
