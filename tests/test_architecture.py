@@ -109,7 +109,7 @@ def test_every_model_is_in_the_catalogue_and_in_the_contract_of_independence(
 PRIVATE = {"_repr_html_", "_replace", "_asdict", "_fields", "_exit", "_config"}
 PRIVATE |= {
     "_files",
-    "_of_files",
+    "_file_methods",
     "_own_extremes",
     "_changed_metric",
     "_of_reference",

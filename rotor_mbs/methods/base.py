@@ -97,20 +97,20 @@ def tolerance_ladder(
 
 
 def tolerance_pair(tolerance: float) -> Mapping[str, float]:
-    """Return relative and absolute tolerance of the same work."""
-    # Angles and rates are of order one: a hundredth of the relative tolerance is nowhere the larger
-    # of the two.
+    """Return the settings for a relative tolerance, with the absolute one that goes with it."""
+    # Angles and rates are of order one: the relative tolerance decides.
     return {"relative_tolerance": tolerance, "absolute_tolerance": 0.01 * tolerance}
 
 
 @dataclass(frozen=True, slots=True)
 class BuiltItem:
-    """Item of a model.
+    """An item of which a model consists, as `show --build` lists it.
 
     Attributes
     ----------
     kind : node, object, marker, load, sensor, equation or term.
-    name, detail : what it is called, and what else there is to say of it.
+    name : of the item.
+    detail : further description.
     """
 
     kind: str
@@ -246,9 +246,10 @@ class Method:
         method of each model. Raises MethodRefusal for a state about which the model cannot be
         linearized.
     arrays : names of optional quantities that it stores, such as "constraint_error".
-    sources : source files of a method of another package, or its code.
-    import_engine : imports the packages it needs, and ignores code compiled by earlier processes;
-        called before a timing.
+    sources : source files of a method of another package, or the text of a method file; a run is
+        computed again if they change.
+    import_engine : imports the packages that the method needs, and switches off caches of code that
+        earlier processes compiled; called before a timing.
     """
 
     name: str
@@ -307,7 +308,9 @@ class Method:
             divided by MAX_STEPS.
         """
         chosen = self.settings.of(self.name, given)
-        step = getattr(chosen, STEP) if self.fixed_step else scene.duration
+        if not self.fixed_step:
+            return chosen
+        step = getattr(chosen, STEP)
         if scene.duration / step > MAX_STEPS:
             limit = f"{MAX_STEPS:g} steps for {scene.duration:g} s"
             allowed = f"a step of at least {scene.duration / MAX_STEPS:g} s"
@@ -332,9 +335,10 @@ class Method:
                 lower: dict[str, object] = {}
                 for name, value in finer.items():
                     current = settings[name]
-                    # By more than the rounding of a value that was given with three digits.
+                    # Not by rounding alone: `next to try` prints values with three digits.
                     if isinstance(current, int | float) and value < 0.99 * current:
                         lower[name] = value
+                # The first setting is the step or the relative tolerance: it must be lower.
                 first_setting = next(iter(finer))
                 if first_setting in lower:
                     return lower

@@ -29,7 +29,7 @@ GROUP = "rotor_mbs.methods"
 
 R = TypeVar("R")
 
-# By the object that has them: how the names of its methods begin.
+# How the names of methods begin, by the place of the tuple that has these methods.
 _BUILT_IN: Mapping[str, tuple[str, ...]] = {
     "rotor_mbs.models.printed.methods:METHODS": ("printed",),
     "rotor_mbs.models.lagrange.methods:METHODS": ("lagrange", REFERENCE),
@@ -46,7 +46,7 @@ def methods() -> tuple[Method, ...]:
     built_in = []
     for place in _BUILT_IN:
         built_in += [method for method in _load(place) if method.name != REFERENCE]
-    return (*built_in, *_plug_ins().values(), *_of_files.values())
+    return (*built_in, *_plug_ins().values(), *_file_methods.values())
 
 
 def method_names(*, is_corrected: bool | None = None) -> tuple[str, ...]:
@@ -54,13 +54,14 @@ def method_names(*, is_corrected: bool | None = None) -> tuple[str, ...]:
 
     Parameters
     ----------
-    is_corrected : True or False for those alone that do, or do not, claim the corrected equations.
+    is_corrected : True for those that claim the corrected equations, False for the others, None for
+        all.
     """
     return tuple(method.name for method in methods() if is_corrected in (None, method.is_corrected))
 
 
 def _built_in(name: str) -> Method | None:
-    """Return the built-in method of a name. Imports only the model whose methods begin so."""
+    """Return the built-in method of a name, or None; only its own model is imported."""
     for place, beginnings in _BUILT_IN.items():
         if name.startswith(beginnings):
             for method in _load(place):
@@ -79,7 +80,7 @@ def find_method_or_none(name: str) -> Method | None:
 
     None where it is not known here: a results file may come from elsewhere.
     """
-    return _built_in(name) or _of_files.get(name) or _plug_ins().get(name)
+    return _built_in(name) or _file_methods.get(name) or _plug_ins().get(name)
 
 
 def find_method(name: str) -> Method:
@@ -105,9 +106,9 @@ def check_names(names: str | Sequence[str]) -> tuple[str, ...]:
     Raises
     ------
     InputError
-        With a line for every unknown name; of the first file that cannot be loaded.
+        With a line for every unknown name, or for the first file that cannot be loaded.
     """
-    names = _with_files([names] if isinstance(names, str) else names)
+    names = _expand_files([names] if isinstance(names, str) else names)
     if unknown := unknown_names(names):
         raise InputError(unknown)
     return tuple(dict.fromkeys(names))
@@ -126,7 +127,7 @@ def unknown_names(names: Sequence[str]) -> list[str]:
 
 
 def is_corrected(name: str) -> bool:
-    """Return whether a method claims the corrected equations; one not known here is taken to."""
+    """Return whether a method claims the corrected equations; True for an unknown method."""
     method = find_method_or_none(name)
     return method is None or method.is_corrected
 
@@ -181,7 +182,7 @@ def ladders(names: Sequence[str] = ()) -> dict[str, tuple[Method, Ladder]]:
     for name in names:
         if name not in allowed:
             what = f"no ladder for method {name!r}"
-            if name in _of_files:
+            if name in _file_methods:
                 needed = "a setting `step` or `tolerance`, or `ladders`: docs/your-engine.md"
                 what += f" (a Method of a file needs {needed})"
             problems.append(f"{what}; allowed: {', '.join(allowed)}")
@@ -196,9 +197,9 @@ def ladders(names: Sequence[str] = ()) -> dict[str, tuple[Method, Ladder]]:
 
 
 def label_of(curve: str) -> str:
-    """Return the label of a method or, by the name of its curve, of a variant of one.
+    """Return the label of a curve: of a method, or of a variant of one, see `ladders`.
 
-    Where it is not known here, its name.
+    An unknown name is its own label.
     """
     method = find_method_or_none(curve)
     if method is not None:
@@ -206,8 +207,8 @@ def label_of(curve: str) -> str:
     curves = ladders()
     if curve not in curves:
         return curve
-    labels = [part.label for part in curves[curve]]
-    return ", ".join(filter(None, labels))
+    method, ladder = curves[curve]
+    return ", ".join(label for label in (method.label, ladder.label) if label)
 
 
 # Methods of files. They are state of this process, as a file may be edited between two calls.
@@ -215,10 +216,10 @@ def label_of(curve: str) -> str:
 # Files that were named, by model.
 _files: dict[str, MethodFile] = {}
 # Their methods by name.
-_of_files: dict[str, Method] = {}
+_file_methods: dict[str, Method] = {}
 
 
-def _with_files(names: Sequence[str]) -> list[str]:
+def _expand_files(names: Sequence[str]) -> list[str]:
     """Return the names with the path of each file replaced by the names of its methods.
 
     Parameters
@@ -242,28 +243,28 @@ def _with_files(names: Sequence[str]) -> list[str]:
         if Path(first).resolve() != path.resolve():
             what = f"methods {model}/... are those of {first}"
             raise InputError(f"{name}: {what}; allowed: another file name")
-        expanded += _add(read_file(name))
+        expanded += _register(read_file(name))
     return expanded
 
 
-def _add(file: MethodFile) -> list[str]:
-    """Make the methods of a file known, in place of those it had before; return their names."""
+def _register(file: MethodFile) -> list[str]:
+    """Register the methods of a file in place of those that it had before; return their names."""
     if _files.get(file.model) != file:
         others = {}
-        for name, method in _of_files.items():
+        for name, method in _file_methods.items():
             if method.model != file.model:
                 others[name] = method
-        loaded = file.load([method for method in methods() if method.name not in _of_files])
-        _of_files.clear()
-        _of_files.update(others | loaded)
+        loaded = file.load([method for method in methods() if method.name not in _file_methods])
+        _file_methods.clear()
+        _file_methods.update(others | loaded)
         _files[file.model] = file
-    return [name for name, method in _of_files.items() if method.model == file.model]
+    return [name for name, method in _file_methods.items() if method.model == file.model]
 
 
 def with_method_files(work: Callable[..., R]) -> Callable[..., R]:
-    """Return a function for another process, where it loads the method files of this one first.
+    """Return a function for another process, which first loads this process's method files there.
 
-    What is printed there, also by `work`, is dropped.
+    What is printed in the other process, also by `work`, is dropped.
 
     Parameters
     ----------
@@ -271,10 +272,10 @@ def with_method_files(work: Callable[..., R]) -> Callable[..., R]:
     """
     if not _files:
         return work
-    return partial(_with_files_of, os.getpid(), tuple(_files.values()), work)
+    return partial(_call_with_files, os.getpid(), tuple(_files.values()), work)
 
 
-def _with_files_of(
+def _call_with_files(
     process_id: int, files: Sequence[MethodFile], work: Callable[..., R], *arguments: object
 ) -> R:
     """Call a function after the methods of files have been loaded.
@@ -282,13 +283,13 @@ def _with_files_of(
     In another process than `process_id`, which created the call, its output is dropped.
     """
     for file in files:
-        _add(file)
+        _register(file)
     with nullcontext() if os.getpid() == process_id else quiet():
         return work(*arguments)
 
 
 def error_line(error: BaseException) -> str:
-    """Return one line of what a method raised, with file and line number where it is a file's."""
+    """Return what a method raised in one line, with the place in a method file if it has one."""
     return located(error, [file.path for file in _files.values()])
 
 
@@ -302,7 +303,7 @@ def _load(place: str) -> tuple[Method, ...]:
 
 
 def _as_methods(loaded: object) -> tuple[Method, ...]:
-    """Return what an entry point names, one method or several. Raises TypeError for others."""
+    """Return the methods in an entry point's object. Raises TypeError if it is something else."""
     several = tuple(loaded) if isinstance(loaded, Iterable) else (loaded,)
     if not several or not all(isinstance(method, Method) for method in several):
         raise TypeError(f"{loaded!r:.60} is no Method and no sequence of them")

@@ -1,7 +1,7 @@
 """Decide which methods run a scene, with which settings.
 
-Those that are named, as far as they can represent the scene; where none is named, those of a rule
-that is drawn from the stability suite: which methods fail, or take minutes, on which scenes.
+Methods that are named run if they can represent the scene. If none is named, a rule selects them.
+It was found with the stability suite, which shows the scenes on which methods fail or take minutes.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ def settings_for(names: Sequence[str], given: Mapping[str, object]) -> dict[str,
         For a setting that none of the methods has, and for a value that is not allowed.
     """
     if len(names) == 1:
-        # Its own message lists the settings with all that is allowed.
+        # The message for a single method also lists what each setting may be.
         find_method(names[0]).settings.of(names[0], given)
     declared = {name: find_method(name).settings.declared() for name in names}
     known = list(dict.fromkeys(setting for settings in declared.values() for setting in settings))
@@ -80,6 +80,7 @@ def own_settings(scene: Scene, method: str) -> dict[str, object]:
     """
     if not scene.settings:
         return {}
+    # Checked against all methods: a setting may be that of a method that is not run.
     try:
         return settings_for(method_names(), dict(scene.settings)).get(method, {})
     except InputError as error:
@@ -88,12 +89,12 @@ def own_settings(scene: Scene, method: str) -> dict[str, object]:
 
 
 def settings_of_run(scene: Scene, method: str, given: Mapping[str, object]) -> dict[str, object]:
-    """Return the settings of a run: those that are given, in place of the scene's own.
+    """Return the settings of a run: the scene's own, overridden by those that are given.
 
     Parameters
     ----------
     scene, method : what is run.
-    given : settings by name, of which the method may have some; checked by `settings_for`.
+    given : settings by name, checked by `settings_for`; those of other methods are ignored.
     """
     declared = find_method(method).settings.declared()
     of_method = {name: value for name, value in given.items() if name in declared}
@@ -108,7 +109,8 @@ def problems_of_methods(values: Mapping[str, Any]) -> list[KeyProblem]:
 def problems_of_scene(values: Mapping[str, Any]) -> list[KeyProblem]:
     """Return what is wrong with the `methods` and `settings` of a scene file.
 
-    A sweep's settings have to be those of the methods that it is run with; a scene's, of any.
+    Each setting must be one of any method. Those of a sweep file are checked elsewhere: they must
+    be settings of the methods that the sweep is run with.
     """
     problems = problems_of_methods(values)
     settings = dict(values.get("settings", ()))
@@ -160,8 +162,8 @@ def supporting_methods(
     ----------
     scene : the scene.
     names : known methods.
-    settings : for the methods that have them, in place of the scene's own and the defaults;
-        already valid by their declared ranges. None if the caller chooses settings that fit.
+    settings : of the call, checked by `settings_for`; for the methods that have them they override
+        the scene's own and the defaults. None if the caller chooses settings that fit the scene.
     are_named : whether the user named the methods.
 
     Raises
@@ -173,20 +175,20 @@ def supporting_methods(
     refused: list[Refusal] = []
     for name in names:
         method = find_method(name)
-        # What a file's method raises while it is built is an InputError.
+        # A method of a user's file raises InputError for any error in its code.
         try:
             method.items(scene)
         except (MethodRefusal, InputError) as exc:
             refused.append(Refusal(scene.name, name, _reason(exc, name), are_named))
             continue
         if settings is not None:
-            own = settings_of_run(scene, name, settings)
-            # Declared ranges are checked before any scene: what is left is that they do not fit
-            # this one.
+            of_run = settings_of_run(scene, name, settings)
+            # Names and ranges are checked already: what is refused here are values that do not fit
+            # this scene, such as a step too short for its duration.
             try:
-                method.chosen(scene, own)
+                method.chosen(scene, of_run)
             except InputError as exc:
-                is_asked = are_named or bool(own)
+                is_asked = are_named or bool(of_run)
                 refused.append(Refusal(scene.name, name, _reason(exc, name), is_asked))
                 continue
         supporting.append(name)
@@ -229,7 +231,7 @@ def selected_methods(
     for scene in scenes:
         if not names and (unknown := unknown_names(scene.methods)):
             raise InputError(f"{scene.name}: methods: {line}" for line in unknown)
-        wanted[scene.name] = list(names or dict.fromkeys(scene.methods))
+        wanted[scene.name] = list(names or dict.fromkeys(scene.methods))  # each once
         if not wanted[scene.name]:
             try:
                 recommended, reason = recommend(scene, default_methods())
@@ -254,20 +256,19 @@ def selected_methods(
 
 # The rule
 
-# Explicit fixed steps at their default (1e-3 s and below) follow a swing up to this rate, rad/s,
+# rad/s: up to this angular frequency explicit fixed steps of default size (1e-3 s and below) stay
 # within their bounds.
 _MAX_EXPLICIT_SWING = 90.0
-# A decay rate, 1/s, times the run, beyond which stability alone, not accuracy, sets an explicit
-# step.
+# Decay rate times duration, beyond which stability alone, not accuracy, limits an explicit step.
 _MAX_EXPLICIT_DECAY = 1e4
-# Radians of the fastest swing in a run beyond which fixed steps take minutes, and the error of each
-# has added up.
+# rad: phase of the fastest oscillation over a run, beyond which fixed steps take minutes and their
+# errors have added up.
 _MAX_FIXED_STEP_TURN = 3e4
-# Share of the rotor's inertia that a quarter turn of the pitch leaves, below which rates jump
-# there.
+# Inertia of the hub relative to the rotor's largest. A single point-mass blade has no inertia about
+# the shaft at a pitch of ±π/2, and only the hub's is left: below this ratio rates jump there.
 _NEARLY_SINGULAR = 1e-3
-# The share below which SciPy's shortest step is too long to pass there: 3e-13 breaks off, 3e-10
-# passes.
+# The same ratio, below which SciPy's shortest step is too long to pass ±π/2: at 3e-13 a run breaks
+# off there, at 3e-10 it passes.
 _NO_STEP_PASSES = 1e-11
 
 
@@ -277,7 +278,7 @@ def recommend(scene: Scene, defaults: tuple[str, ...]) -> tuple[tuple[str, ...],
     Parameters
     ----------
     scene : the scene.
-    defaults : names of the methods that run where nothing speaks against them.
+    defaults : names of the methods that run unless the scene is singular, stiff or long.
 
     Returns
     -------
@@ -299,8 +300,7 @@ def recommend(scene: Scene, defaults: tuple[str, ...]) -> tuple[tuple[str, ...],
     if decay * scene.duration > _MAX_EXPLICIT_DECAY and decay > 10.0 * swing:
         reason = f"overdamped (largest decay rate {decay:.2g} 1/s): an implicit method in addition"
         return (closed_form, "lagrange/radau"), reason
-    # One point-mass blade that may come to a quarter turn of its pitch, on a hub that is light
-    # beside it: its inertia about the shaft all but vanishes there.
+    # One point-mass blade whose pitch may come to ±π/2, where its inertia about the shaft vanishes.
     has_one_point = len(scene.blades) == 1 and scene.blades[0].is_point_mass
     if has_one_point and _leaves_zero_pitch(scene):
         rotor_inertia = _largest_rotor_inertia(scene)
@@ -331,9 +331,9 @@ def fastest_rates(scene: Scene) -> tuple[float, float]:
 
     Returns
     -------
-    swing : rad/s, of the pitches by spring, torque, gravity and a driven rotor, or the initial
-        rate.
-    decay : 1/s, of the shaft's and the bearings' dampers.
+    swing : rad/s, largest of the initial rates and of the angular frequencies of the pitches under
+        spring, torque, gravity and the acceleration of a driven rotor.
+    decay : 1/s, largest decay rate by the dampers of shaft and bearings.
     """
     swing = abs(scene.initial_rates[0])
     rotor_inertia = _largest_rotor_inertia(scene)
@@ -353,7 +353,7 @@ def fastest_rates(scene: Scene) -> tuple[float, float]:
         x, y, z = blade.centre_of_mass
         inertia = blade.pitch_inertia
         torque = max((abs(value) for _, value in torques), default=0.0)
-        # N m about the pitch axis; of the spring, over a radian.
+        # N m about the pitch axis; that of the spring at a deflection of 1 rad.
         acceleration = scene.gravity + driven * abs(z)
         moment = stiffness + torque + blade.mass * acceleration * math.hypot(x, y)
         swing = max(swing, math.sqrt(moment / inertia), abs(rate))
@@ -387,10 +387,10 @@ def singular_reason(scene: Scene) -> str:
 
 
 def _largest_rotor_inertia(scene: Scene) -> float:
-    """Return the largest inertia about the shaft (kg m²) that the rotor has at any pitches.
+    """Return an upper bound on the rotor's inertia about the shaft (kg m²), for all pitches.
 
-    No axis through the apex has more than half the trace of a tensor, and a point mass far from the
-    axis has as much.
+    A moment of inertia is at most half the trace of its tensor. A point mass reaches the bound when
+    it is furthest from the shaft.
     """
     total = scene.hub_inertia
     for blade in scene.blades:
@@ -399,9 +399,11 @@ def _largest_rotor_inertia(scene: Scene) -> float:
 
 
 def _leaves_zero_pitch(scene: Scene) -> bool:
-    """Return whether the pitch of the first blade moves, and no spring keeps it below ±π/2."""
+    """Return whether the first blade's pitch leaves zero, with no spring to keep it below ±π/2."""
     _, y, _ = scene.blades[0].centre_of_mass
     starts_at_zero = scene.initial_angles[1] == 0.0 and scene.initial_rates[1] == 0.0
     leans = scene.blades[0].cone != 0.0 or (scene.shaft_tilt != 0.0 and scene.gravity != 0.0)
-    stays = y == 0.0 and starts_at_zero and not scene.pitch_torque and not leans
+    # A blade in the plane of rotation has no moment about its pitch axis.
+    is_in_plane = y == 0.0 and not leans
+    stays = is_in_plane and starts_at_zero and not scene.pitch_torque
     return not stays and not any(scene.bearing_stiffness)

@@ -50,7 +50,8 @@ def choice(default: object, options: Sequence[object], *, doc: str = "") -> Any:
 
     Parameters
     ----------
-    default, options : one of the allowed values, and all of them: texts, numbers or flags.
+    default : one of the allowed values.
+    options : all of them: texts, numbers or flags.
     doc : description in one line.
     """
     kind = keys.choice(options, " or ".join(map(str, options)))
@@ -59,16 +60,17 @@ def choice(default: object, options: Sequence[object], *, doc: str = "") -> Any:
 
 def _declaration(kind: Kind, unit: str, doc: str) -> dict[str, Any]:
     """Return the metadata of a field, as `Settings.declared` gives them."""
-    # What is allowed stands in parentheses behind the name: the unit needs other marks there.
-    return keys.declaration(kind, unit, f", in {unit}" if unit else "", doc=doc)
+    # Messages have what is allowed in parentheses, so that the unit is added in words.
+    note = f", in {unit}" if unit else ""
+    return keys.declaration(kind, unit, note, doc=doc)
 
 
-# Of a field that a class declares without these functions.
+# For a field that a class declares without `number`, `step` or `choice`.
 _UNDECLARED = _declaration(keys.PYTHON_NUMBER, "", "")
 
 
 def unknown_setting(name: str, known: Iterable[str]) -> str:
-    """Return the line for a setting that no method has; a key of a scene has a point in it."""
+    """Return the line for an unknown setting, with a hint if it looks like a key of a scene."""
     line = f"no setting {name!r}{nearest(name, known)}"
     if "." in name:
         line += " (a key of scenes? rotor-mbs new FILE --from SCENE copies one, to be edited)"
@@ -101,7 +103,7 @@ class Settings:
         Raises
         ------
         InputError
-            One line with all settings, for an unknown name, or a value that is not allowed.
+            For unknown names and values that are not allowed, in one line with all settings.
         """
         declared = cls.declared()
         values: dict[str, Any] = {}

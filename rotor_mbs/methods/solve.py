@@ -21,7 +21,7 @@ from rotor_mbs.solution.trajectory import (
     shape_fault,
 )
 
-_OBSERVING_S = 1.0  # in any case, of what was reached by the time limit
+_OBSERVING_S = 1.0  # at least, to take the samples after the time limit was reached
 
 
 @caller_signals()
@@ -48,7 +48,7 @@ def solve(
     Returns
     -------
     Solution
-        Without a status: it is not yet judged, and has a failure that the engine reports.
+        Not judged yet, without a status; its `integration` is the engine's report.
 
     Raises
     ------
@@ -61,14 +61,14 @@ def solve(
     RotorError
         If the method returns objects of other types, or arrays of a wrong shape.
     Exception
-        One of SYSTEM_ERRORS if the system lacks something or a library cannot be loaded; whatever
-        else the method raises.
+        One of SYSTEM_ERRORS if the system lacks memory, files or processes, or a library cannot be
+        loaded; otherwise what the method raises.
     """
     method = find_method(method) if isinstance(method, str) else method
     chosen = method.chosen(scene, settings)
     with system_errors_apart(OutOfTimeError):
         start = time.perf_counter()
-        solver = _built(method, method.build(scene, chosen))
+        solver = _checked_solver(method, method.build(scene, chosen))
         setup_s = time.perf_counter() - start
 
         run_times: list[float] = []
@@ -83,7 +83,7 @@ def solve(
                     integration = solver.integrate()
                     run_times.append(time.perf_counter() - start)
                     _check_report(method, solver, integration)
-                    if integration.out_of_time:  # another would not be stopped
+                    if integration.out_of_time:  # the limit would not stop another
                         break
         finally:
             if gc_was_on:
@@ -91,7 +91,7 @@ def solve(
 
         start = time.perf_counter()
         remaining_s = max(begin + time_limit_s - time.monotonic(), _OBSERVING_S)
-        # Samples of a motion that runs away overflow: the judgement sees what is not finite.
+        # Samples of a diverging run overflow; the judgement finds what is not finite.
         with time_limit(remaining_s), np.errstate(over="ignore", invalid="ignore"):
             trajectory = solver.observe()
         checked_result(trajectory, Trajectory, "observe", solver.observe, method.name)
@@ -110,8 +110,8 @@ def solve(
     )
 
 
-def _built(method: Method, solver: Solver) -> Solver:
-    """Return what a method built. Raises RotorError if it is no solver."""
+def _checked_solver(method: Method, solver: Solver) -> Solver:
+    """Return what a method's `build` returned. Raises RotorError if it is no solver."""
     missing = [name for name in ("integrate", "observe") if not hasattr(solver, name)]
     if missing:
         place = place_of(method.build, method.name)

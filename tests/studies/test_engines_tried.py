@@ -36,7 +36,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     monkeypatch.chdir(tmp_path)
     yield tmp_path
     catalogue._files.clear()
-    catalogue._of_files.clear()
+    catalogue._file_methods.clear()
 
 
 def method_of(name: str) -> str:

@@ -13,7 +13,7 @@ def forget_method_files() -> None:
     """Empty what the catalogue knows of methods in files, which later tests have under the same
     names."""
     catalogue._files.clear()
-    catalogue._of_files.clear()
+    catalogue._file_methods.clear()
 
 
 def forget_what_is_installed() -> None:
