@@ -1,4 +1,8 @@
-"""Define the design of a results file: requested runs, the tables of the file, their columns."""
+"""Define the design of a results file: requested runs, the tables of the file, their columns.
+
+The design is what is known of a row before it is computed: scene, method, settings, versions. Its
+columns are called known; the others are computed, and filled in row by row.
+"""
 
 from __future__ import annotations
 
@@ -21,13 +25,13 @@ from rotor_mbs.solution.quantities import DEFECT, LOADS, SCALES, quantities, sca
 from rotor_mbs.solution.status import STATUSES
 
 MISSING = -1  # status of a row that is not stored
-# What the table of a scene's arrays repeats of the run's row in another table; in a row it has this
-# name.
+# A run has a row in /runs, and one in the table of its scene's arrays, which repeats these columns.
+# Where both are joined to one row, the repeated ones have the names on the right.
 STATUS_COPIES = {"status": "status_repeated", "samples": "samples_repeated"}
-# kind of a column of texts that are computed: (run, characters), UTF-8, then zeros
+# Type of a column of computed texts: (run, characters) bytes of UTF-8, filled up with zeros.
 CHARACTER = "S1"
 RUNS = "runs"
-# What a frozen reference stores: it cannot be computed again from angles and rates as precisely.
+# Arrays of a frozen reference: angles and rates, and what cannot be derived from them as precisely.
 REFERENCE_ARRAYS = (
     "angles",
     "rates",
@@ -36,7 +40,7 @@ REFERENCE_ARRAYS = (
     "angle_uncertainty",
     "error_growth",
 )
-ONCE_A_SCENE = ("angle_uncertainty", "error_growth")  # stored once a scene, over time
+ONCE_A_SCENE = ("angle_uncertainty", "error_growth")  # over time, of the reference alone
 
 
 def flags(names: Sequence[str], first: int = 0) -> dict[str, Any]:
@@ -50,8 +54,8 @@ def flags(names: Sequence[str], first: int = 0) -> dict[str, Any]:
     }
 
 
-# What a row has beside metrics, whichever table it is in; in the order of the columns.
-_FACTS = {
+# Values of a row before its metrics, in the order of the columns; each says which tables have it.
+_OUTCOME_VALUES = {
     "status": RowValue(
         "1",
         "outcome of the run, see the status codes; -1: not computed yet",
@@ -113,7 +117,8 @@ _FACTS = {
         "s", "largest step of the ladder with an error of at most 1e-6 rad", "stability"
     ),
 }
-_LAST = {
+# Values after the metrics; the checksum is the last.
+_CHECKSUM_VALUES = {
     "code": RowValue(
         "1",
         "CRC-32 of the versions (package, code, libraries of the method) that computed the run",
@@ -127,7 +132,7 @@ _LAST = {
         "<u4",
     ),
 }
-_ROW_VALUES = _FACTS | METRICS | _LAST
+_ROW_VALUES = _OUTCOME_VALUES | METRICS | _CHECKSUM_VALUES
 
 
 def _column(value: RowValue) -> Column:
@@ -141,16 +146,18 @@ COLUMNS["status"] = COLUMNS["status"]._replace(attributes=flags(("missing", *STA
 
 
 def columns_in(table: str) -> dict[str, Column]:
-    """Return the computed columns with one value per row of a table, by its name.
+    """Return the computed columns of a table that have one value per row, by name.
 
-    See `RowValue`.
+    The table is named as in `RowValue.tables`.
     """
-    return {
-        name: COLUMNS[name] for name, value in _ROW_VALUES.items() if table in value.tables.split()
-    }
+    columns = {}
+    for name, value in _ROW_VALUES.items():
+        if table in value.tables.split():
+            columns[name] = COLUMNS[name]
+    return columns
 
 
-# What the design says of each row of a table, in this order: units, long name. What has no entry is
+# Units and long name of each known column, in the order of the file; other values of a design have
 # no column.
 DESIGN_COLUMNS = {
     "scene": ("1", "name of the scene"),
@@ -165,7 +172,7 @@ DESIGN_COLUMNS = {
     "tolerance": ("1", "tolerance of the method"),
     "order_expected": ("1", "order of the method"),
 }
-NUMBERS = ("step", "tolerance", "order_expected")  # those of them that are no texts
+NUMBERS = ("step", "tolerance", "order_expected")  # known columns of numbers; others are texts
 
 _TEXT_LENGTH = 600  # characters of a message
 # The computed columns of each table of points.
@@ -182,8 +189,8 @@ class RunRequest:
     ----------
     scene : the scene.
     method, settings : name of the method, and the settings that are given for it.
-    versions : of what computes it, by default those of this installation; of a reference that is
-        read from a shipped file also who computed it (`frozen_with`).
+    versions : of what computes it; None for those of this installation. For a reference that is
+        read from a shipped file they include those that it was computed with (`frozen_with`).
     """
 
     scene: Scene
@@ -208,7 +215,7 @@ class RunRequest:
 
     @property
     def known(self) -> dict[str, str]:
-        """Return the columns of /runs that follow from the design."""
+        """Return the values of the known columns of its row in /runs."""
         method = find_method(self.method)
         settings = method.chosen(self.scene, self.settings).as_dict()
         return {
@@ -230,15 +237,15 @@ def metric_columns(outputs: Iterable[str]) -> dict[str, Column]:
     columns = columns_in(RUNS)
     for quantity in quantities(outputs):
         name, long_name = quantity.name, quantity.long_name
-        if quantity.judgement is not None:
-            unit = "1" if quantity.judgement.scale_of else quantity.units
-            error = "largest relative error" if quantity.judgement.scale_of else "largest error"
-            text = (
-                f"{long_name}: {error}"
-                if quantity.judgement.with_reference
-                else f"{long_name} over the run"
-            )
-            columns[quantity.judgement.metric] = Column(("run",), unit, text)
+        judgement = quantity.judgement
+        if judgement is not None:
+            unit, error = quantity.units, "largest error"
+            if judgement.scale_of:
+                unit, error = "1", "largest relative error"
+            text = f"{long_name} over the run"
+            if judgement.with_reference:
+                text = f"{long_name}: {error}"
+            columns[judgement.metric] = Column(("run",), unit, text)
         if quantity.has_peak:
             columns[f"{name}_max"] = Column(("run",), quantity.units, f"{long_name}: maximum")
             columns[f"{name}_max_time_s"] = Column(
@@ -259,10 +266,10 @@ def arrays_of(run: RunRequest) -> dict[str, Column]:
     run : the request; what is stored depends on the scene's outputs and the method.
     """
     method = find_method(run.method)
-    # A reference is read back by its angles and rates, whatever the scene asks for.
-    outputs = (
-        (*run.scene.outputs, "angles", "rates") if run.method == REFERENCE else run.scene.outputs
-    )
+    outputs = run.scene.outputs
+    if run.method == REFERENCE:
+        # A reference is read back by its angles and rates, whatever the scene asks for.
+        outputs = (*outputs, "angles", "rates")
     columns = {}
     for quantity in quantities(outputs):
         is_computed = quantity.required or quantity.name in method.arrays
@@ -285,11 +292,10 @@ class TableSpec:
     Attributes
     ----------
     group : its path in the file; "" for the root.
-    runs : (rows,) the scale `run`: unique texts, or numbers.
-    known : by name, column and values of the other dimensions' scales, and of what the design says
-        of each row.
-    computed : columns that are computed, in the order in which the checksum of a row covers them.
-        One without the dimension `run` belongs to the reference.
+    runs : (rows,) unique labels or numbers of the rows: the scale of the dimension `run`.
+    known : by name, column and values: known columns of the rows, and scales of other dimensions.
+    computed : columns that are filled in later, in the order in which the checksum of a row covers
+        them. One without the dimension `run` belongs to the reference.
     attributes : of the group.
     characters : length of each computed text.
     """
@@ -304,16 +310,14 @@ class TableSpec:
     @functools.cached_property
     def row_type(self) -> np.dtype[np.void]:
         """Return the type of one row: its computed columns in the order of its checksum."""
-        lengths = {name: len(values) for name, (_, values) in self.known.items()} | {
-            CHARACTERS: self.characters
-        }
-        shapes = {
-            name: tuple(lengths[dimension] for dimension in column.dimensions if dimension != "run")
-            for name, column in self.computed.items()
-        }
-        return np.dtype(
-            [(name, column.kind, shapes[name]) for name, column in self.computed.items()]
-        )
+        lengths = {name: len(values) for name, (_, values) in self.known.items()}
+        lengths[CHARACTERS] = self.characters
+        fields: list[tuple[str, str, tuple[int, ...]]] = []
+        for name, column in self.computed.items():
+            dimensions = [dimension for dimension in column.dimensions if dimension != "run"]
+            shape = tuple(lengths[dimension] for dimension in dimensions)
+            fields.append((name, column.kind, shape))
+        return np.dtype(fields)
 
     def shape(self, name: str) -> tuple[int, ...]:
         """Return the shape of a computed column."""
@@ -322,12 +326,15 @@ class TableSpec:
 
     @functools.cached_property
     def known_rows(self) -> Mapping[str, Mapping[str, Any]]:
-        """Return what the design says of each run, by run."""
+        """Return the known values of each row by column, by label of the row.
+
+        It is for tables whose known columns all have the dimension `run`.
+        """
         columns = {name: list(values) for name, (_, values) in self.known.items()}
-        return {
-            str(run): {name: values[i] for name, values in columns.items()}
-            for i, run in enumerate(self.runs)
-        }
+        rows = {}
+        for i, run in enumerate(self.runs):
+            rows[str(run)] = {name: values[i] for name, values in columns.items()}
+        return rows
 
     @functools.cached_property
     def row_of(self) -> Mapping[str, int]:
@@ -346,11 +353,9 @@ def known_columns(rows: Sequence[Mapping[str, object]]) -> dict[str, tuple[Colum
     for name, (units, long_name) in DESIGN_COLUMNS.items():
         if rows and name in rows[0]:
             values: Any = [row[name] for row in rows]
-            is_text = isinstance(values[0], str)
-            columns[name] = (
-                Column(("run",), units, long_name),
-                values if is_text else np.array(values, float),
-            )
+            if not isinstance(values[0], str):
+                values = np.array(values, float)
+            columns[name] = Column(("run",), units, long_name), values
     return columns
 
 
@@ -360,7 +365,7 @@ def scene_scales(scene: Scene, columns: Iterable[Column]) -> dict[str, tuple[Col
     Parameters
     ----------
     scene : the scene.
-    columns : of the table; only scales that one of them has are returned, and time.
+    columns : of the table; the scales of their dimensions are returned, and that of time.
     """
     used = {"time"}.union(*(column.dimensions for column in columns))
     values = scale_values(scene)
@@ -368,22 +373,25 @@ def scene_scales(scene: Scene, columns: Iterable[Column]) -> dict[str, tuple[Col
         "time": {"standard_name": "time"},
         "coordinate": {"labels": scene.coordinate_labels},
     }
-    return {
-        name: (
-            Column((name,), scale.units, scale.long_name, attributes=attributes.get(name, {})),
-            values[name],
-        )
-        for name, scale in SCALES.items()
-        if name in used
-    }
+    scales = {}
+    for name, scale in SCALES.items():
+        if name in used:
+            described = attributes.get(name, {})
+            column = Column((name,), scale.units, scale.long_name, attributes=described)
+            scales[name] = column, values[name]
+    return scales
 
 
-def runs_table(asked: Sequence[RunRequest]) -> TableSpec:
+def runs_table(requests: Sequence[RunRequest]) -> TableSpec:
     """Return the table /runs of a file with these runs."""
-    outputs = dict.fromkeys(output for run in asked for output in run.scene.outputs)
-    known = known_columns([run.known for run in asked])
+    outputs = dict.fromkeys(output for run in requests for output in run.scene.outputs)
+    known = known_columns([run.known for run in requests])
     return TableSpec(
-        RUNS, [run.label for run in asked], known, metric_columns(outputs), characters=_TEXT_LENGTH
+        RUNS,
+        [run.label for run in requests],
+        known,
+        metric_columns(outputs),
+        characters=_TEXT_LENGTH,
     )
 
 
@@ -396,12 +404,11 @@ def scene_table(runs: Sequence[RunRequest], arrays: Collection[str] | None = Non
     arrays : names of the arrays that are stored, by default all.
     """
     scene = runs[0].scene
-    computed = {
-        name: column
-        for run in runs
-        for name, column in arrays_of(run).items()
-        if arrays is None or name in arrays
-    }
+    computed = {}
+    for run in runs:
+        for name, column in arrays_of(run).items():
+            if arrays is None or name in arrays:
+                computed[name] = column
     attributes = {
         "title": scene.title,
         "figures": ", ".join(scene.figures),
@@ -419,14 +426,14 @@ def scene_table(runs: Sequence[RunRequest], arrays: Collection[str] | None = Non
     )
 
 
-def results_tables(asked: Sequence[RunRequest]) -> list[TableSpec]:
+def results_tables(requests: Sequence[RunRequest]) -> list[TableSpec]:
     """Return all tables of a file with these runs: /runs, then the arrays of each scene."""
-    asked = sorted(asked, key=lambda run: row_order(run.label))
+    requests = sorted(requests, key=lambda run: row_order(run.label))
     by_scene: dict[str, list[RunRequest]] = {}
-    for run in asked:
+    for run in requests:
         by_scene.setdefault(run.scene.name, []).append(run)
     return [
-        runs_table(asked),
+        runs_table(requests),
         *(scene_table(runs) for runs in by_scene.values()),
     ]
 

@@ -1,7 +1,7 @@
 """Read attributes, columns and values of groups with the HDF5 library, but not the rows.
 
-The files are of this program. The worker process of `runs.untrusted` loads this module and what it
-imports, so that it starts fast.
+The files are of this program. The worker process of `runs.untrusted` loads this module; it imports
+little, so that the worker starts fast.
 """
 
 from __future__ import annotations
@@ -22,7 +22,8 @@ from rotor_mbs.runs.untrusted import read_in_worker
 CHARACTERS = "characters"  # the dimension of texts that are filled in later
 # The netCDF-4 library's name for the scale of a dimension without values.
 WITHOUT_VALUES = "This is a netCDF dimension but not a netCDF variable."
-_NOT_ATTRIBUTES = (
+# Attributes that the HDF5 and netCDF-4 libraries write for themselves.
+_LIBRARY_ATTRIBUTES = (
     "CLASS",
     "NAME",
     "REFERENCE_LIST",
@@ -30,7 +31,7 @@ _NOT_ATTRIBUTES = (
     "_Netcdf4Dimid",
     "_Netcdf4Coordinates",
 )
-# A text of variable length as it lies in a dataset.
+# How a dataset stores a text of variable length: its length, and where it is in the file's heap.
 _REFERENCE = np.dtype([("length", "<u4"), ("heap", "<u8"), ("index", "<u4")])
 # Texts of variable length: for NumPy, and as the library has them in memory and in a file.
 TEXT = h5py.string_dtype()
@@ -44,10 +45,10 @@ class Column(NamedTuple):
 
     Attributes
     ----------
-    dimensions : names of scales; a scale has its own name.
+    dimensions : names of the scales of its axes; the dimension of a scale is the scale itself.
     units, long_name : its unit and its meaning.
     kind : type of its values in the file.
-    attributes : further ones.
+    attributes : further attributes, by name.
     """
 
     dimensions: tuple[str, ...]
@@ -64,7 +65,7 @@ class StoredRows(NamedTuple):
     ----------
     shape : of the column.
     offset : in the file, bytes.
-    is_in_place : whether that is what the trailer says.
+    is_in_place : whether the trailer has the same offset and length.
     """
 
     shape: tuple[int, ...]
@@ -78,9 +79,9 @@ class StoredGroup(NamedTuple):
     Attributes
     ----------
     attributes : of the group.
-    columns : its datasets by name.
-    values : of each dataset whose rows are not in the trailer.
-    rows : location of each dataset whose rows are in the trailer.
+    columns : descriptions of its datasets, by name.
+    values : of the known columns and scales, which are datasets that the trailer does not have.
+    rows : locations of the computed columns, which are the datasets that the trailer has.
     characters : length of each computed text.
     """
 
@@ -116,7 +117,7 @@ def read_content(
     Parameters
     ----------
     path : the file.
-    kinds : of files; one of another kind has no groups here.
+    kinds : of files whose groups are read; for a file of another kind there are none.
     only : names of the groups to read, by default all.
 
     Raises
@@ -149,8 +150,9 @@ def _read_arrays(path: Path, asked: tuple[str, Collection[str]]) -> dict[str, ND
         return {name: values_of(member(group_at(file, group), name)) for name in names}
 
 
-def _read_content(path: Path, asked: tuple[Collection[str], Collection[str] | None]) -> Content:
-    kinds, only = asked
+def _read_content(path: Path, selection: tuple[Collection[str], Collection[str] | None]) -> Content:
+    """Read a file in this process; `selection` is (kinds, only), see `read_content`."""
+    kinds, only = selection
     with open_file(path) as (file, trailer), reading(path):
         names = list(trailer.groups) if trailer.kind in kinds else []
         groups = {}
@@ -161,6 +163,7 @@ def _read_content(path: Path, asked: tuple[Collection[str], Collection[str] | No
 
 
 def _read_group(group: Any, regions: Mapping[str, tuple[int, int]]) -> StoredGroup:
+    """Read a group, but of the columns in `regions` only where they are."""
     datasets = datasets_of(group)
     columns = columns_of(datasets)
     values = {name: values_of(dataset) for name, dataset in datasets.items() if name not in regions}
@@ -216,7 +219,7 @@ def open_file(path: Path) -> Iterator[tuple[Any, Trailer]]:
 
 @contextmanager
 def reading(path: Path | str, what: str = "") -> Iterator[None]:
-    """Raise an error of the block that the content of a file causes as a StoreError.
+    """Turn an error that the content of a file causes in the block into a StoreError.
 
     HDF5 raises errors of many types on damaged files, and so does code that uses the content of a
     forged file with a right digest.
@@ -286,8 +289,8 @@ def values_of(dataset: Any) -> NDArray[Any]:
         return values
     if h5py.check_string_dtype(dataset.dtype) is None:
         raise StoreError(f"{place} is no array")
-    # Each text is a reference that begins with its length, and all may refer to one text: bounded
-    # before it is read.
+    # Each text is stored as a reference with a length, and all references may lead to one text: the
+    # sum of the lengths is limited before they are read.
     if dataset.size:
         texts = np.memmap(
             dataset.file.filename, _REFERENCE, "r", dataset.id.get_offset(), dataset.shape
@@ -311,7 +314,9 @@ def attributes_of(target: Any) -> dict[str, Any]:
 
     Those that the HDF5 library writes itself are left out.
     """
-    return {name: attribute(target, name) for name in target.attrs if name not in _NOT_ATTRIBUTES}
+    return {
+        name: attribute(target, name) for name in target.attrs if name not in _LIBRARY_ATTRIBUTES
+    }
 
 
 def attribute(target: Any, name: str, default: Any = None) -> Any:
@@ -363,7 +368,7 @@ def _dimension(dataset: Any, axis: int, name: str, scale_names: dict[int, str]) 
     Parameters
     ----------
     dataset, axis, name : the array, the number of its axis, and its name.
-    scale_names : by address of a scale in the file, names that are known; the scale is added.
+    scale_names : names of scales by their address in the file; that of this one is added.
     """
     scales: list[Any] = []
     if h5py.h5ds.get_num_scales(dataset.id, axis):
@@ -372,8 +377,8 @@ def _dimension(dataset: Any, axis: int, name: str, scale_names: dict[int, str]) 
         return name
     address = h5py.h5o.get_info(scales[0]).addr
     if address not in scale_names:
-        # By its attribute: the library would look for its path through the whole file, and its own
-        # way to a name ends the process where that is damaged.
+        # The name is read from an attribute. The library would search the whole file for the
+        # scale's path, and its function for the name ends the process if the name is damaged.
         scale = str(attribute(h5py.Dataset(scales[0]), "NAME"))
         scale_names[address] = CHARACTERS if scale.startswith(WITHOUT_VALUES) else scale
     return scale_names[address]
@@ -395,7 +400,7 @@ def columns_of(datasets: Mapping[str, Any]) -> dict[str, Column]:
         attributes = attributes_of(dataset)
         attributes.pop("_Encoding", None)
         for key, value in attributes.items():
-            # Lists of texts as such; numbers as they are, whose type belongs to the attribute.
+            # Lists of texts stay lists, numbers arrays: their type is part of the attribute.
             if isinstance(value, list) and not isinstance(value[0], str):
                 attributes[key] = dataset.attrs[key]
         units, long_name = str(attributes.pop("units")), str(attributes.pop("long_name"))

@@ -35,7 +35,7 @@ FORMAT = "rotor_mbs"
 CONVENTIONS = "CF-1.11, ACDD-1.3"
 # What every file is about: the attribute `keywords` of the ACDD conventions.
 KEYWORDS = "multibody dynamics, wind turbine rotor, Euler-Lagrange equations, model verification"
-_HEAD_BYTES = 1 << 17  # of a file beside its rows, at most: descriptions and texts
+_HEAD_BYTES = 1 << 17  # at most, of descriptions and texts outside the rows of a file
 
 
 @contextmanager
@@ -45,7 +45,8 @@ def create_file(
     """Yield a new file with room for all rows of tables, under a temporary name.
 
     It gets its name after the block; if the block raises, it is removed. Its space is reserved
-    twice: HDF5 does not survive a disk that fills up, and it truncates the file when it begins.
+    before HDF5 writes, as HDF5 does not survive a disk that fills up, and once more afterwards, as
+    HDF5 truncates the file when it opens it.
 
     Parameters
     ----------
@@ -64,30 +65,31 @@ def create_file(
         If it cannot be written, or the disk has no room for it.
     """
     with replacing(path) as temporary:
-        rows = sum(
-            len(table.runs) * (table.row_type.itemsize + 8 * (4 + len(table.known)))
-            for table in tables
-        )
-        _reserve(temporary, _HEAD_BYTES + rows)
-        with begin_file(temporary) as file:
-            put_attributes(file, attributes)
-            rows_of = {table.group: _put_table(file, table) for table in tables}
-        kind = SWEEP if "" in rows_of else RESULTS
-        with temporary.open("r+b") as laid:
-            trailer = trailer_of(laid, kind, rows_of)
+        size = _HEAD_BYTES
+        for table in tables:
+            # Known columns are counted as 8 bytes each, and four more of them: an estimate.
+            row_bytes = table.row_type.itemsize + 8 * (4 + len(table.known))
+            size += len(table.runs) * row_bytes
+        _reserve(temporary, size)
+        with begin_file(temporary) as hdf5_file:
+            put_attributes(hdf5_file, attributes)
+            regions = {table.group: _put_table(hdf5_file, table) for table in tables}
+        kind = SWEEP if "" in regions else RESULTS
+        with temporary.open("r+b") as file:
+            trailer = trailer_of(file, kind, regions)
             trust(digest_of(trailer))
-            laid.seek(0, os.SEEK_END)
-            laid.write(trailer)
+            file.seek(0, os.SEEK_END)
+            file.write(trailer)
         _reserve(temporary, temporary.stat().st_size)
-        # All that a reader would find is known here: reading it back would take longer than writing
+        # What a reader of the file would find is known: to read it would take longer than to write
         # it.
         inode = temporary.stat().st_ino
         laid_tables = []
         for table in tables:
-            offsets = {name: offset for name, (offset, _) in rows_of[table.group].items()}
-            known = {
-                name: (column, _as_stored(values)) for name, (column, values) in table.known.items()
-            }
+            offsets = {name: offset for name, (offset, _) in regions[table.group].items()}
+            known = {}
+            for name, (column, values) in table.known.items():
+                known[name] = column, _as_stored(values)
             laid_tables.append(
                 StoredTable(
                     group=table.group,
@@ -140,12 +142,12 @@ def _put_table(file: Any, table: TableSpec) -> dict[str, tuple[int, int]]:
         put_dimension(group, CHARACTERS, table.characters)
     for name, (column, values) in table.known.items():
         put(group, name, values, column)
-    rows = {}
+    regions = {}
     for name, column in table.computed.items():
         kind, shape = table.row_type[name].base, table.shape(name)
-        dataset = put_empty(group, name, shape, kind, column, MISSING if name == "status" else None)
-        rows[name] = place_of(dataset)
-    return rows
+        fill = MISSING if name == "status" else None
+        regions[name] = place_of(put_empty(group, name, shape, kind, column, fill))
+    return regions
 
 
 def begin_file(place: Path | str, **driver: object) -> Any:
@@ -176,7 +178,8 @@ def put(group: Any, name: str, values: Any, column: Column) -> Any:
 
     The scales of its dimensions must exist; a scale is its own dimension.
     """
-    return _described(group.create_dataset(name, data=_as_stored(values)), group, name, column)
+    dataset = group.create_dataset(name, data=_as_stored(values))
+    return _describe(dataset, group, name, column)
 
 
 def _as_stored(values: Any) -> NDArray[Any]:
@@ -185,7 +188,8 @@ def _as_stored(values: Any) -> NDArray[Any]:
     return np.array(list(values), dtype=TEXT) if is_text else np.asarray(values)
 
 
-def _described(dataset: Any, group: Any, name: str, column: Column) -> Any:
+def _describe(dataset: Any, group: Any, name: str, column: Column) -> Any:
+    """Write a dataset's attributes, attach the scales of its dimensions, and return it."""
     put_attributes(
         dataset, {"units": column.units, "long_name": column.long_name, **column.attributes}
     )
@@ -228,7 +232,8 @@ def put_empty(
     layout.set_fill_time(h5py.h5d.FILL_TIME_NEVER if fill is None else h5py.h5d.FILL_TIME_ALLOC)
     if fill is not None:
         layout.set_fill_value(np.array(fill, kind))
-    dataset = _described(group.create_dataset(name, shape, kind, dcpl=layout), group, name, column)
+    dataset = group.create_dataset(name, shape, kind, dcpl=layout)
+    _describe(dataset, group, name, column)
     if np.dtype(kind).kind == "S":
         dataset.attrs["_Encoding"] = "utf-8"
     return dataset

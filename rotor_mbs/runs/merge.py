@@ -52,54 +52,54 @@ def fit_file_to_request(
         path = path.resolve()
     if not may_extend(path, RESULTS):
         return _write_tables(path, wanted, [])
-    old, new = TableFile(path), {table.group: table for table in wanted}
-    stored = old.tables
-    wanted_runs = _known_rows(new.get(RUNS))
+    file = TableFile(path)
+    stored = file.tables
+    wanted_tables = {table.group: table for table in wanted}
+    wanted_runs = _known_rows(wanted_tables.get(RUNS))
     hashes = {row["scene"]: row["scene_hash"] for row in wanted_runs.values()}
     # A file has one scene of each name: runs of the scene with its earlier numbers cannot stay.
-    lost = [
-        f"{path}: {row['scene']}: has {row['method_name']} of a scene of that name with other "
-        "numbers, which this call would drop; allowed: another output file, or a call that has "
-        "this method too"
-        for run, row in _known_rows(stored.get(RUNS)).items()
-        if hashes.get(row["scene"], row["scene_hash"]) != row["scene_hash"]
-        and run not in wanted_runs
-    ]
+    lost = []
+    for run, row in _known_rows(stored.get(RUNS)).items():
+        has_changed = hashes.get(row["scene"], row["scene_hash"]) != row["scene_hash"]
+        if has_changed and run not in wanted_runs:
+            lost.append(
+                f"{path}: {row['scene']}: has {row['method_name']} of a scene of that name with "
+                "other numbers, which this call would drop; allowed: another output file, or a "
+                "call that has this method too"
+            )
     if lost:
         raise InputError(lost)
     merged: dict[str, TableSpec] = {}
     kept: list[tuple[str, str]] = []
-    for group in dict.fromkeys((*stored, *new)):
-        before, requested = stored.get(group), new.get(group)
+    for group in dict.fromkeys((*stored, *wanted_tables)):
+        before, requested = stored.get(group), wanted_tables.get(group)
         base = requested or stored[group]
         # Tables of a scene's arrays have no checksums; they follow below from the runs that stay.
         if "crc32" not in base.computed:
             continue
         requested_rows = _known_rows(requested)
-        rows = {
-            run: row
-            for run, row in _known_rows(before).items()
-            if run in requested_rows
-            or (group, row["scene"], row.get("curve", row["method_name"])) not in replaced
-        }
-        for run, row in rows.items():
-            if run not in requested_rows or _is_same(row, requested_rows[run]):
+        rows: dict[str, Mapping[str, Any]] = {}
+        for run, row in _known_rows(before).items():
+            curve = group, row["scene"], row.get("curve", row["method_name"])
+            if run not in requested_rows and curve in replaced:
+                continue
+            rows[run] = row
+            if run not in requested_rows or _is_same_row(row, requested_rows[run]):
                 kept.append((group, run))
         rows |= requested_rows
         if rows:
             runs = sorted(rows, key=row_order) if group == RUNS else list(rows)
-            known = {
-                name: (column, [rows[run][name] for run in runs])
-                for name, (column, _) in base.known.items()
-            }
-            columns = _joined(before, requested)
+            known = {}
+            for name, (column, _) in base.known.items():
+                known[name] = column, [rows[run][name] for run in runs]
+            columns = _joined_columns(before, requested)
             merged[group] = TableSpec(group, runs, known, columns, base.attributes, base.characters)
     methods: dict[str, list[str]] = {}  # by scene
     if RUNS in merged:
         for run, scene in zip(merged[RUNS].runs, merged[RUNS].known["scene"][1], strict=True):
             methods.setdefault(scene, []).append(str(run).removeprefix(f"{scene}/"))
-    for scene, own in methods.items():
-        before, requested = stored.get(scene), new.get(scene)
+    for scene, methods_of_scene in methods.items():
+        before, requested = stored.get(scene), wanted_tables.get(scene)
         # Arrays of a scene with other numbers are not taken over.
         if (
             before is not None
@@ -107,20 +107,20 @@ def fit_file_to_request(
             and before.attributes["scene_hash"] != requested.attributes["scene_hash"]
         ):
             before = None
-        base, columns = requested or stored[scene], _joined(before, requested)
-        merged[scene] = TableSpec(scene, own, base.known, columns, base.attributes, base.characters)
+        base = requested or stored[scene]
+        columns = _joined_columns(before, requested)
+        merged[scene] = TableSpec(
+            scene, methods_of_scene, base.known, columns, base.attributes, base.characters
+        )
     # The file is kept if it has these rows and columns, and none of its rows is dropped.
-    is_same = merged.keys() == stored.keys() and all(
-        list(table.runs) == list(stored[group].runs)
-        and table.computed.keys() == stored[group].computed.keys()
-        for group, table in merged.items()
-    )
-    if is_same and len(kept) == sum(
-        len(table.runs) for table in stored.values() if "crc32" in table.computed
-    ):
-        return old
-    places = [(group, run, old.place(run, group)) for group, run in kept]
-    rows_kept = [(group, run, place.read()) for group, run, place in places if place.is_stored]
+    count = sum(len(table.runs) for table in stored.values() if "crc32" in table.computed)
+    if len(kept) == count and _have_same_layout(merged, stored):
+        return file
+    rows_kept = []
+    for group, run in kept:
+        place = file.place(run, group)
+        if place.is_stored:
+            rows_kept.append((group, run, place.read()))
     return _write_tables(path, list(merged.values()), rows_kept)
 
 
@@ -143,35 +143,53 @@ def copy_file(source: Path, target: Path) -> None:
     with locked(target):
         if may_extend(target, read_trailer(source).kind):
             old, new = TableFile(target), TableFile(source)
-            is_same = old.attributes.get(IDENTITY) == new.attributes.get(IDENTITY)
+            is_same_sweep = old.attributes.get(IDENTITY) == new.attributes.get(IDENTITY)
             for group, table in old.tables.items():
-                copied = (
-                    {str(run) for run in new.tables[group].runs}
-                    if is_same and group in new.tables
-                    else set()
-                )
+                copied: set[str] = set()
+                if is_same_sweep and group in new.tables:
+                    copied = {str(run) for run in new.tables[group].runs}
                 for run, status in zip(map(str, table.runs), table.column("status"), strict=True):
                     if status != MISSING and run not in copied:
+                        what = f"{group}: {run}" if group else f"run {run}"
                         raise InputError(
-                            f"{target}: has {f'{group}: ' if group else 'run '}{run}, which would "
-                            "be lost; allowed: another name, or remove that file"
+                            f"{target}: has {what}, which would be lost; allowed: another name, or "
+                            "remove that file"
                         )
         write_file(target, source.read_bytes())
 
 
 def _known_rows(table: TableSpec | None) -> Mapping[str, Mapping[str, Any]]:
+    """Return the known values of each row of a table, by label; none without a table."""
     return {} if table is None else table.known_rows
 
 
-def _is_same(stored: Mapping[str, Any], requested: Mapping[str, Any]) -> bool:
-    """Return whether a row is as it is requested; a missing number is NaN in both."""
-    return stored.keys() == requested.keys() and all(
-        value == requested[name] or (value != value and requested[name] != requested[name])
-        for name, value in stored.items()
-    )
+def _is_same_row(stored: Mapping[str, Any], requested: Mapping[str, Any]) -> bool:
+    """Return whether the known values of a row are those that are requested."""
+    if stored.keys() != requested.keys():
+        return False
+    for name, value in stored.items():
+        other = requested[name]
+        # A number that is missing is NaN, which differs from itself.
+        are_both_missing = value != value and other != other
+        if value != other and not are_both_missing:
+            return False
+    return True
 
 
-def _joined(before: TableSpec | None, requested: TableSpec | None) -> dict[str, Column]:
+def _have_same_layout(tables: Mapping[str, TableSpec], others: Mapping[str, TableSpec]) -> bool:
+    """Return whether tables by group have the same rows and computed columns as others."""
+    if tables.keys() != others.keys():
+        return False
+    for group, table in tables.items():
+        other = others[group]
+        if list(table.runs) != list(other.runs):
+            return False
+        if table.computed.keys() != other.computed.keys():
+            return False
+    return True
+
+
+def _joined_columns(before: TableSpec | None, requested: TableSpec | None) -> dict[str, Column]:
     """Return the computed columns of two tables, the checksum last."""
     columns: dict[str, Column] = {}
     for table in (before, requested):
@@ -208,7 +226,7 @@ def _write_tables(
     summary = f"runs: {count}, scenes: {len(scenes)}; trajectories, energies, status and errors"
     if others:
         summary += f"; tables {', '.join(others)}"
-    # as ACDD asks for them
+    # The attributes that the ACDD conventions ask for.
     described = {"title": "Rotor models compared", "summary": summary, "keywords": KEYWORDS}
     attributes = {
         **described,
@@ -222,12 +240,11 @@ def _write_tables(
             stored.clear()
         for group, run, values in rows:
             place = file.place(run, group)
-            blank = blank_rows(1, place.row_type)
-            place.write(
-                {name: values.get(name, blank[name]) for name in place.row_type.names or ()}
-            )
-    # It is the same file under its name now.
-    return TableFile(
-        path,
-        laid_out_as=(attributes, [replace(stored, path=path) for stored in file.tables.values()]),
-    )
+            # A column that the earlier row did not have stays blank.
+            columns = blank_rows(1, place.row_type)
+            for name in columns:
+                columns[name] = values.get(name, columns[name])
+            place.write(columns)
+    # The file that was laid out has its final name now.
+    laid_tables = [replace(stored, path=path) for stored in file.tables.values()]
+    return TableFile(path, laid_out_as=(attributes, laid_tables))

@@ -136,9 +136,10 @@ class StoredRun:
             if name in ("status", "crc32", *STATUS_COPIES.values(), *_TEXTS) or np.ndim(value):
                 continue
             number = value.item()
-            if (isinstance(number, int) and number >= 0) or (
-                isinstance(number, float) and number == number
-            ):
+            # A number that the run does not have is -1 or NaN.
+            is_whole = isinstance(number, int) and number >= 0
+            is_real = isinstance(number, float) and not math.isnan(number)
+            if is_whole or is_real:
                 facts[name] = number
         return facts
 
@@ -166,7 +167,7 @@ class StoredRun:
     def labels(self) -> list[str]:
         """Return the names of the coordinates: rotor, pitch 1, ...
 
-        They are none if neither angles nor rates are stored.
+        The list is empty if neither angles nor rates are stored.
         """
         is_known = "angles" in self or "rates" in self
         return list(coordinate_labels(len(self.scales["coordinate"]) - 1)) if is_known else []
@@ -176,14 +177,12 @@ class StoredRun:
         """Return the number of samples that the run computed."""
         if not self._is_of_sweep:
             return int(self._row["samples"])
-        # Its arrays are NaN after a run broke off.
-        arrays = [
-            values
-            for values in self._own_arrays.values()
-            if len(values) == len(self.scales["time"])
-        ]
-        is_there = [np.isfinite(values.reshape(len(values), -1)).all(axis=1) for values in arrays]
-        return int(np.all(is_there, axis=0).sum()) if is_there else 0
+        # Samples are counted in the arrays, which are NaN from where the run broke off.
+        is_finite = []
+        for values in self._own_arrays.values():
+            if len(values) == len(self.scales["time"]):
+                is_finite.append(np.isfinite(values.reshape(len(values), -1)).all(axis=1))
+        return int(np.all(is_finite, axis=0).sum()) if is_finite else 0
 
     @property
     def _is_of_sweep(self) -> bool:
@@ -252,7 +251,7 @@ class StoredRun:
         may_omit_others = self.is_frozen or not is_built_in(self.method)
         expected: dict[str, tuple[int, ...]] = {"time": (rows,)}
         for quantity in quantities(scene.outputs):
-            if self._is_of_sweep and quantity.name not in self._row:  # which has outputs of its own
+            if self._is_of_sweep and quantity.name not in self._row:  # a sweep has its own outputs
                 continue
             if may_omit_others and quantity.name not in (*always_there, *self.names):
                 continue
@@ -272,9 +271,8 @@ class StoredRun:
             elif len(values) != shape[0]:
                 faults.append(f"{name} has {len(values)} rows, not {shape[0]}")
             elif not np.isfinite(values).all():
-                faults.append(
-                    f"{name} is not finite at sample {int(np.argwhere(~np.isfinite(values))[0][0])}"
-                )
+                sample = int(np.argwhere(~np.isfinite(values))[0][0])
+                faults.append(f"{name} is not finite at sample {sample}")
         return faults
 
     def trajectory(self) -> Trajectory | None:
@@ -295,7 +293,8 @@ class StoredRun:
         trajectory, facts = self.trajectory(), self.attributes
         if trajectory is None:
             return None
-        # A frozen reference has no report of its engine, and of a sweep's runs none is stored.
+        # The engine's report, as far as it is stored. A frozen reference has none and is a success;
+        # a sweep stores none, and the status takes its place.
         is_reported = "engine_success" in self._row
         success = self.is_frozen if is_reported else self.status == "ok"
         success = bool(facts.get("engine_success", success))
@@ -459,7 +458,7 @@ def open_results(
             inode = os.fstat(file.fileno()).st_ino
             if any(table.inode != inode for table in stored.tables.values()):
                 continue
-            with reading(path):  # what is made of it, too: rows are read when they are asked for
+            with reading(path):  # around the caller's block, too, in which rows are read
                 scenes = {scene.name: scene for scene in _scenes(stored, file, verify, only)}
                 yield OpenResults(
                     path, stored.attributes, {name: scenes[name] for name in natural_order(scenes)}
@@ -594,11 +593,10 @@ def run_arrays(path: Path, group: str = "", scene: str = "") -> dict[str, NDArra
     `group` and `scene` select the run "scene/method" as in `read_arrays`.
     """
     with open_results(path) as results:
-        runs = {
-            f"{name}/{run.method}": run
-            for name, known in results.scenes.items()
-            for run in known.runs.values()
-        }
+        runs = {}
+        for name, stored in results.scenes.items():
+            for run in stored.runs.values():
+                runs[f"{name}/{run.method}"] = run
         run = runs[chosen_group(path, list(runs), group, scene)]
         return {name: run.array(name) for name in run.names if run.array(name).ndim <= 3}
 
@@ -730,21 +728,22 @@ def _point_records(stored: StoredTable) -> Iterator[Record]:
     columns = stored.place().read(len(stored.runs)) | {
         name: stored.column(name) for name in NUMBERS if name in stored.known
     }
-    owners = [(row["scene"], row.get("curve", row["method_name"])) for row in rows]
-    for scene, name in dict.fromkeys(owners):
-        own = [i for i, owner in enumerate(owners) if owner == (scene, name)]
-        if (statuses[own] == MISSING).any():
+    curves = [(row["scene"], row.get("curve", row["method_name"])) for row in rows]
+    for scene, name in dict.fromkeys(curves):
+        places = [i for i, curve in enumerate(curves) if curve == (scene, name)]
+        if (statuses[places] == MISSING).any():
             continue
-        known = rows[own[0]]
-        arrays = {column: values[own] for column, values in columns.items()}
+        known = rows[places[0]]
+        arrays = {column: values[places] for column, values in columns.items()}
         setting_kind = str(known.get("setting_kind", "step"))
         arrays["setting"] = arrays[setting_kind]
-        facts: dict[str, Any] = {
-            column: value
-            for column, values in arrays.items()
-            if column not in ("status", "message", "setting")
-            and (value := values[0].item()) == value
-        }
+        # What the curve has as a whole stands in its first row; a number that is missing is NaN.
+        facts: dict[str, Any] = {}
+        for column, values in arrays.items():
+            if column not in ("status", "message", "setting"):
+                value = values[0].item()
+                if value == value:
+                    facts[column] = value
         messages = [text_of(text) for text in arrays.pop("message")]
         if kind == "stability":  # without steps that were not needed
             used = arrays["status"] != code_of("left_out")

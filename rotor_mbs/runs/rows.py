@@ -124,7 +124,7 @@ class RowLocation:
     def read(self, count: int = 1, file: IO[bytes] | None = None) -> Rows:
         """Read the columns of `count` rows, each (count, ...).
 
-        `file` may be the file that is open already. Raises OSError, ValueError.
+        `file` is the file if it is open already. Raises OSError, ValueError.
         """
         with nullcontext(file) if file is not None else self.path.open("rb") as source:
             rows = {}
@@ -165,9 +165,11 @@ class RowLocation:
 
 def checksums(first: int, rows: Rows, row: np.dtype[np.void]) -> NDArray[np.uint32]:
     """Return the CRC-32 of each row over its number and its columns, (rows,) uint32."""
-    # Begun with the number of the row, so that a row in the place of another one is found.
-    sums = [first + i & 0xFFFFFFFF for i in range(len(rows["status"]))]
-    for name in (name for name in row.names or () if name != "crc32"):
+    # A sum begins with the number of the row, so that a row in the place of another is detected.
+    sums = [(first + i) & 0xFFFFFFFF for i in range(len(rows["status"]))]
+    for name in row.names or ():
+        if name == "crc32":
+            continue
         contents: Any = np.ascontiguousarray(rows[name], row[name].base).reshape(len(sums), -1)
         sums = [zlib.crc32(content, so_far) for content, so_far in zip(contents, sums, strict=True)]
     return np.array(sums, np.uint32)
@@ -199,12 +201,16 @@ def row_of_run(run: Solution, place: RowLocation, facts: Mapping[str, object]) -
     Parameters
     ----------
     run : the run.
-    place : location of the row, which has its columns.
+    place : location of the row, with its columns.
     facts : further values by name of the column.
     """
-    integration, run_times_s = run.integration, run.run_times_s or [math.nan]
-    # A reference is read back by its angles and rates, whatever the scene asks for.
-    own = {"angles": run.angles, "rates": run.rates} if run.method == REFERENCE else {}
+    integration = run.integration
+    steps, evaluations = integration.steps, integration.rhs_evaluations
+    run_times_s = run.run_times_s or [math.nan]
+    arrays = dict(run.quantities)
+    if run.method == REFERENCE:
+        # A reference is read back by its angles and rates, whatever the scene asks for.
+        arrays |= {"angles": run.angles, "rates": run.rates}
     return place.encode(
         {
             "status": run.status,
@@ -212,10 +218,8 @@ def row_of_run(run: Solution, place: RowLocation, facts: Mapping[str, object]) -
             "engine_message": integration.message,
             "samples": len(run.time),
             "time_reached": float(run.time[-1]) if len(run.time) else 0.0,
-            "steps": -1 if integration.steps is None else integration.steps,
-            "rhs_evaluations": -1
-            if integration.rhs_evaluations is None
-            else integration.rhs_evaluations,
+            "steps": -1 if steps is None else steps,
+            "rhs_evaluations": -1 if evaluations is None else evaluations,
             "engine_success": int(integration.success),
             "setup_time_s": run.setup_time_s,
             "run_time_s": float(np.median(run_times_s)),
@@ -224,7 +228,6 @@ def row_of_run(run: Solution, place: RowLocation, facts: Mapping[str, object]) -
             "repeats": len(run.run_times_s),
             **run.metrics,
             **facts,
-            **run.quantities,
-            **own,
+            **arrays,
         }
     )

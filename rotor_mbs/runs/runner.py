@@ -122,9 +122,9 @@ def run_tasks(pool: TaskPool, tasks: Iterable[T]) -> Iterator[TaskEnd[T, Rows]]:
     Yields
     ------
     TaskEnd
-        Its `value` has at least the status and message of the stored rows, also for a failure that
-        is stored, and the run time if there is one. It is None if nothing is stored; `failure` and
-        `message` then have the reason: REFUSED if the method refused the scene.
+        Its `value` has at least the columns `status` and `message` of the stored rows, and their
+        run time if there is one; a failure can be stored, too. If nothing is stored, `value` is
+        None, and `failure` and `message` say why: REFUSED if the method refused the scene.
 
     Raises
     ------
@@ -186,40 +186,45 @@ def run_tasks_references_first(
         The outcome of each task, in the order in which they ended; those whose reference is missing
         are last.
     """
-    made: list[RunOutcome] = []
-    total, done = sum(task.work for task in tasks), 0.0
+    outcomes: list[RunOutcome] = []
+    total_work = sum(task.work for task in tasks)
+    done_work = 0.0
 
-    def note(end: TaskEnd[Task, Rows]) -> None:
-        nonlocal done
-        done += end.task.work
+    def report(end: TaskEnd[Task, Rows]) -> None:
+        nonlocal done_work
+        done_work += end.task.work
         if end.value is None:
             outcome = RunOutcome(
                 end.task.label, end.task.method, end.failure, end.message, is_stored=False
             )
         else:
             outcome = end.task.outcome(end.value)
-        made.append(replace(outcome, share=done / total))
-        on_progress(len(made), len(tasks), made[-1])
+        outcome = replace(outcome, share=done_work / total_work)
+        outcomes.append(outcome)
+        on_progress(len(outcomes), len(tasks), outcome)
 
     for end in run_tasks(pool, [task for task in tasks if task.reference is None]):
-        note(end)
+        report(end)
     ready: list[Task] = []
     without_reference: list[Task] = []
     for task in tasks:
-        if task.reference is not None:
-            (ready if task.reference.is_stored else without_reference).append(task)
-    # Slowest first, so that no long one starts last and keeps one process busy while the others
-    # wait; between them the fastest, which are those that are compiled, so that two processes
-    # seldom compile the same code at once.
+        if task.reference is None:
+            continue
+        if task.reference.is_stored:
+            ready.append(task)
+        else:
+            without_reference.append(task)
+    # The slowest tasks come first: one that started last would keep one process busy while the
+    # others wait. They take turns with the fastest, whose methods compile code when they start, so
+    # that two processes seldom compile the same code at once.
     ready.sort(key=lambda task: -task.work)
     quarter, count = len(ready) // 4, len(ready)
-    turns = [
-        task
-        for pair in zip(ready[:quarter], ready[count - quarter :], strict=True)
-        for task in pair
-    ]
-    for end in run_tasks(pool, [*turns, *ready[quarter : count - quarter]]):
-        note(end)
+    ordered: list[Task] = []
+    for slow, fast in zip(ready[:quarter], ready[count - quarter :], strict=True):
+        ordered += [slow, fast]
+    ordered += ready[quarter : count - quarter]
+    for end in run_tasks(pool, ordered):
+        report(end)
     for task in without_reference:
-        note(TaskEnd(task, None, "no_reference", "its reference was not computed"))
-    return made
+        report(TaskEnd(task, None, "no_reference", "its reference was not computed"))
+    return outcomes

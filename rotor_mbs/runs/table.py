@@ -6,9 +6,9 @@
     /                     of a sweep's file: one table
 
 All space is taken when a file is laid out (`runs.layout`). From then on no HDF5 metadata changes,
-so that the file is valid and can be read at every moment. What the design says of a row (its scene,
-method, settings, versions) is written with the layout and covered by the digest in the file's
-trailer (`runs.trailer`); rows have checksums (`runs.rows`).
+so that the file is valid and can be read at every moment. The known columns (scene, method,
+settings, versions, see `runs.design`) are written with the layout and covered by the digest in the
+file's trailer (`runs.trailer`); rows of computed columns have checksums (`runs.rows`).
 
 An HDF5 handle that is open while rows are written reads old values, and one that writes would
 destroy them: nothing is written by the HDF5 library after the layout.
@@ -47,7 +47,7 @@ from rotor_mbs.runs.hdf5 import Column, StoredGroup, read_content, reading
 from rotor_mbs.runs.rows import RowLocation, blank_rows
 from rotor_mbs.runs.trailer import RESULTS, SWEEP
 
-# the attribute of a sweep's file with a hash of all that the design says
+# Attribute of a sweep's file: a hash of its whole design.
 IDENTITY = "sweep_identity"
 _READ_BYTES = 1 << 25  # read at once when checksums are verified
 _LONGEST_LABEL = 1000  # characters; names of files are shorter
@@ -140,35 +140,33 @@ class StoredTable(TableSpec):
         return statuses
 
     def clear(self) -> None:
-        """Write blank rows, which a reader of an unfinished file sees; statuses are not changed."""
+        """Write blank values into all rows of a new file; their statuses are not changed."""
         with self.path.open("r+b") as file:
             for name, blank in blank_rows(1, self.row_type).items():
-                if name != "status":
-                    file.seek(self.offsets[name])
-                    for _ in range(
-                        len(self.runs) if "run" in self.computed[name].dimensions else 1
-                    ):
-                        file.write(blank.data)
+                if name == "status":
+                    continue
+                has_rows = "run" in self.computed[name].dimensions
+                file.seek(self.offsets[name])
+                for _ in range(len(self.runs) if has_rows else 1):
+                    file.write(blank.data)
 
     def place(self, row: int = 0) -> RowLocation:
-        """Return the location of the rows from one on.
+        """Return the location of the rows from number `row` on.
 
-        Their checksums begin with the number of the run if runs are numbered, otherwise with that
-        of the row.
+        A checksum begins with the number of the run if runs are numbered, otherwise with that of
+        the row.
 
         Parameters
         ----------
         row : number of the first row, from 0.
         """
-        is_numbered = (
-            isinstance(self.runs, np.ndarray) and self.runs.dtype.kind == "i" and len(self.runs) > 0
-        )
+        first = 0
+        if isinstance(self.runs, np.ndarray) and self.runs.dtype.kind == "i" and len(self.runs):
+            first = int(self.runs[0])
         names = [name for name, column in self.computed.items() if "run" in column.dimensions]
         kinds = np.dtype([(name, self.row_type[name]) for name in names])
         offsets = {name: self.offsets[name] for name in names}
-        return RowLocation(
-            self.path, self.inode, int(self.runs[0]) if is_numbered else 0, offsets, kinds
-        ).at(row)
+        return RowLocation(self.path, self.inode, first, offsets, kinds).at(row)
 
 
 def parsed(text: object, kind: type[T], place: object) -> T:
@@ -220,7 +218,8 @@ class TableFile:
         ----------
         path : the file.
         only : groups of the tables that are read, by default all.
-        laid_out_as : attributes and all tables of a file that was just laid out, which is not read.
+        laid_out_as : attributes and all tables of a file that was just laid out, in place of
+            reading it.
 
         Raises
         ------
@@ -265,10 +264,10 @@ class TableFile:
         rows = self.tables[RUNS].known_rows if RUNS in self.tables else {}
         for run, row in rows.items():
             scene, method = row["scene"], row["method_name"]
-            is_there = scene in self.groups and (
-                scene not in self.tables or method in self.tables[scene].runs
-            )
-            if run != f"{scene}/{method}" or not is_there or len(run) > _LONGEST_LABEL:
+            has_arrays = scene in self.groups
+            if scene in self.tables:
+                has_arrays = has_arrays and method in self.tables[scene].runs
+            if run != f"{scene}/{method}" or not has_arrays or len(run) > _LONGEST_LABEL:
                 raise StoreError(f"{self.path}: {run[:_LONGEST_LABEL]} has no arrays; damaged")
 
     def place(self, run: str, group: str = RUNS) -> RowLocation:
@@ -287,26 +286,26 @@ class TableFile:
         scene = str(stored.column("scene")[row])
         arrays = self.tables[scene]
         label = run.removeprefix(f"{scene}/")
-        others = arrays.place(arrays.row_of[label])
-        offsets = {STATUS_COPIES.get(name, name): offset for name, offset in others.offsets.items()}
-        kinds = [
-            (STATUS_COPIES.get(name, name), others.row_type[name])
-            for name in others.row_type.names or ()
-        ]
+        # Columns of /runs first, then those of the scene's table under names of their own.
+        offsets = dict(place.offsets)
+        kinds = [(name, place.row_type[name]) for name in place.row_type.names or ()]
+        of_arrays = arrays.place(arrays.row_of[label])
+        for name in of_arrays.row_type.names or ():
+            joined_name = STATUS_COPIES.get(name, name)
+            offsets[joined_name] = of_arrays.offsets[name]
+            kinds.append((joined_name, of_arrays.row_type[name]))
+        # Arrays that a scene has once are part of the reference's row.
         for name, column in arrays.computed.items():
             if label == REFERENCE and "run" not in column.dimensions:
                 offsets[name] = arrays.offsets[name]
                 kinds.append((name, arrays.row_type[name]))
-        own = [(name, place.row_type[name]) for name in place.row_type.names or ()]
-        return replace(
-            place, offsets={**place.offsets, **offsets}, row_type=np.dtype([*own, *kinds])
-        )
+        return replace(place, offsets=offsets, row_type=np.dtype(kinds))
 
 
 _opened: dict[tuple[Path, Path, tuple[int, ...]], TableFile] = {}
 _opening = threading.Lock()  # held while `_opened` is used
 _MAX_OPENED = 4  # files whose tables are kept
-_SETTLED_NS = 100_000_000  # since the last write, which a clock's tick might hide
+_SETTLED_NS = 100_000_000  # since the last write: a later one then has another time stamp
 
 
 def opened_tables(path: Path, only: Collection[str] | None = None) -> TableFile:
@@ -386,12 +385,12 @@ def _table(path: Path, group: str, stored: StoredGroup, inode: int) -> StoredTab
             )
         if is_wrong:
             raise StoreError(f"{path}: {group}/{name} has shape {rows.shape} of {kind}; damaged")
-    _check(table)
+    _check_table(table)
     return table
 
 
-# What every table of a kind has: computed columns; columns that the design says; attributes.
-_ALWAYS: Mapping[str, tuple[Collection[str], Collection[str], Collection[str]]] = {
+# By group of a table, what it must have: computed columns, known columns, attributes.
+_REQUIRED: Mapping[str, tuple[Collection[str], Collection[str], Collection[str]]] = {
     "": (("status", "crc32"), (), ()),
     RUNS: (
         ("status", "message", "engine_message", "samples", "time_limit_s", "crc32"),
@@ -400,20 +399,20 @@ _ALWAYS: Mapping[str, tuple[Collection[str], Collection[str], Collection[str]]] 
     ),
     **{group: (columns, ("scene", "method_name"), ()) for group, columns in POINT_COLUMNS.items()},
 }
-_OF_A_SCENE = (STATUS_COPIES, ("time",), ("title", "scene_toml", "scene_hash"))
+_REQUIRED_OF_SCENE = (STATUS_COPIES, ("time",), ("title", "scene_toml", "scene_hash"))
 
 
-def _check(table: StoredTable) -> None:
-    """Raise StoreError if a table lacks what its kind always has, or columns are inconsistent.
+def _check_table(table: StoredTable) -> None:
+    """Raise StoreError if a table lacks something that is required, or columns are inconsistent.
 
-    A digest can be right although another program wrote the file.
+    The digest does not replace this check: a file of another program can have a right one.
 
     Parameters
     ----------
     table : the table.
     """
     place = f"{table.path}: {table.group or 'file'}"
-    computed, known, attributes = _ALWAYS.get(table.group, _OF_A_SCENE)
+    computed, known, attributes = _REQUIRED.get(table.group, _REQUIRED_OF_SCENE)
     for name in computed:
         if name not in table.computed:
             raise StoreError(f"{place}: has no {name}; damaged")

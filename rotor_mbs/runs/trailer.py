@@ -28,11 +28,11 @@ from rotor_mbs.errors import InputError, StoreError
 
 FORMAT_VERSION = 3
 MAGIC = b"rmbs-end"
-# The attribute `integrity` of every file: how it is checked. By it a file is known whose trailer is
-# gone.
+# The attribute `integrity` of every file: how it is checked. It also identifies a file without its
+# trailer.
 INTEGRITY = "CRC-32 of each row; SHA-256 of the rest, behind the end of HDF5"
 RESULTS, SWEEP, MODES, COMPARISON = "results", "sweep", "modes", "comparison"
-SPLIT_OF = "split of "  # and the name of the sweep's file: a split of its dataset
+SPLIT_OF = "split of "  # followed by the name of a sweep's file: kind of a split of its dataset
 _KINDS = {
     RESULTS: "runs, bench or stability",
     SWEEP: "a sweep",
@@ -46,7 +46,7 @@ _BLOCK = 1 << 20  # bytes that are read at once
 _HEAD = 1 << 24  # bytes at the beginning in which the attributes of a file are looked for
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 _END_OF_HDF5 = slice(40, 48)  # of its first bytes, in the superblock that h5py writes by default
-_OF_A_LAYOUT = re.compile(r"\..*\.[0-9]+\.tmp")  # the name of a file that `replacing` has begun
+_UNFINISHED_NAME = re.compile(r"\..*\.[0-9]+\.tmp")  # of a file that `replacing` has begun
 
 # By group, by name of a computed column: offset and length of its rows in bytes.
 Regions = Mapping[str, Mapping[str, tuple[int, int]]]
@@ -70,7 +70,7 @@ class Trailer(NamedTuple):
 
 
 def trailer_of(file: IO[bytes], kind: str, groups: Regions) -> bytes:
-    """Return the bytes that complete an HDF5 file which is laid out."""
+    """Return the trailer of an HDF5 file that is laid out, to be appended to it."""
     text = json.dumps(
         {"format_version": FORMAT_VERSION, "kind": kind, "groups": groups}, separators=(",", ":")
     )
@@ -117,12 +117,12 @@ def read_trailer(path: Path) -> Trailer:
         )
     try:
         with path.open("rb") as file:
-            return _checked(path, file)
+            return _read_checked(path, file)
     except OSError as exc:
         raise StoreError(f"{path}: cannot be read: {exc.strerror}") from exc
 
 
-def _checked(path: Path, file: IO[bytes]) -> Trailer:
+def _read_checked(path: Path, file: IO[bytes]) -> Trailer:
     """Return the trailer of an open file after its digest was compared.
 
     Parameters
@@ -139,7 +139,7 @@ def _checked(path: Path, file: IO[bytes]) -> Trailer:
     file.seek(max(size - _TAIL, 0))
     tail = file.read(_TAIL)
     if len(tail) < _TAIL or not tail.endswith(MAGIC):
-        raise StoreError(f"{path}: {_why_without(path, file, size)}")
+        raise StoreError(f"{path}: {_reason_without_trailer(path, file, size)}")
     damaged = StoreError(
         f"{path}: damaged: what was laid out is not as it was written (its digest does not match)"
     )
@@ -150,8 +150,8 @@ def _checked(path: Path, file: IO[bytes]) -> Trailer:
     file.seek(end)
     text = file.read(length)
     try:
-        known = json.loads(text)
-        version, kind, groups = known["format_version"], known["kind"], known["groups"]
+        content = json.loads(text)
+        version, kind, groups = content["format_version"], content["kind"], content["groups"]
         digest = hashlib.sha256()
         for block in _blocks(file, end, groups):
             digest.update(block)
@@ -165,7 +165,7 @@ def _checked(path: Path, file: IO[bytes]) -> Trailer:
             f"{path}: format_version {version!r}, this program reads {FORMAT_VERSION}; allowed: a "
             "file of this version, with its runs recomputed"
         )
-    if not isinstance(kind, str) or not _words(kind):
+    if not isinstance(kind, str) or not _kind_in_words(kind):
         raise StoreError(
             f"{path}: damaged: kind {kind!r}; allowed: {', '.join(_KINDS)}, {SPLIT_OF}FILE"
         )
@@ -205,13 +205,14 @@ def may_extend(path: Path, kind: str) -> bool:
     found = read_trailer(path).kind
     if found != kind:
         raise InputError(
-            f"{path}: holds {_words(found)}, and this command writes {_words(kind)}; allowed: "
-            "another output file"
+            f"{path}: holds {_kind_in_words(found)}, and this command writes "
+            f"{_kind_in_words(kind)}; allowed: another output file"
         )
     return True
 
 
-def _words(kind: str) -> str:
+def _kind_in_words(kind: str) -> str:
+    """Return what a file of a kind holds, in words; "" for an unknown kind."""
     return kind if kind.startswith(SPLIT_OF) else _KINDS.get(kind, "")
 
 
@@ -229,9 +230,12 @@ def _blocks(file: IO[bytes], end: int, groups: Regions) -> Iterator[bytes]:
     ValueError, TypeError, AttributeError
         If `groups` are no regions that follow one another.
     """
-    every = [tuple(region) for columns in groups.values() for region in columns.values()]
+    regions = []
+    for columns in groups.values():
+        regions += [tuple(region) for region in columns.values()]
+    regions = sorted(region for region in regions if region[1])
     position = 0
-    for start, length in [*sorted(region for region in every if region[1]), (end, 0)]:
+    for start, length in [*regions, (end, 0)]:
         if not position <= start <= start + length <= end:
             raise ValueError(f"{length} bytes at {start}")
         file.seek(position)
@@ -244,7 +248,7 @@ def _blocks(file: IO[bytes], end: int, groups: Regions) -> Iterator[bytes]:
         position = start + length
 
 
-def _why_without(path: Path, file: IO[bytes], size: int) -> str:
+def _reason_without_trailer(path: Path, file: IO[bytes], size: int) -> str:
     """Describe a file that does not end with a trailer.
 
     Parameters
@@ -255,7 +259,7 @@ def _why_without(path: Path, file: IO[bytes], size: int) -> str:
     """
     file.seek(0)
     head = file.read(_HEAD)
-    if _OF_A_LAYOUT.fullmatch(path.name):
+    if _UNFINISHED_NAME.fullmatch(path.name):
         return "a layout that was interrupted; allowed: to remove it"
     if not head.startswith(_HDF5):
         return "not an HDF5 file; allowed: a file that rotor-mbs wrote"

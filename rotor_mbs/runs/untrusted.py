@@ -1,9 +1,10 @@
 """Read files with the HDF5 library in a worker process with limits of time and memory.
 
 A digest is no signature: a forged file can have a right one. The library follows the trees, heaps
-and headers of a file as they are, and some forged ones end the process, or are read without end or
-into endless memory. Only the worker is then lost; otherwise this process receives what was read as
-plain values. It reads without the worker only what it wrote, or what came with the program.
+and headers of a file as they are. Some forged files end the process that reads them, and others are
+read without end, or fill the memory. So a worker process reads a file and returns plain values, and
+only the worker is lost. Without it are read files that this process wrote, and those that came with
+the program.
 """
 
 from __future__ import annotations
@@ -25,15 +26,17 @@ from rotor_mbs.runs.trailer import read_trailer
 T = TypeVar("T")
 R = TypeVar("R")
 
-# Limits of processor time (s), which are the same on a busy machine, and of address space (bytes):
-# for any file, and for each byte of it outside the rows, of which reading takes about 1 us.
+# Limits of processor time (s), which does not depend on how busy the machine is, and of address
+# space (bytes): for every file, and in addition for each byte outside its rows. It takes about 1 us
+# to read a byte.
 TIME_S = 10.0
 TIME_OF_BYTE_S = 1e-5
 MEMORY = 1 << 30
 MEMORY_OF_BYTE = 16
-# for what takes time without the processor; also the limit where the system has none
+# Elapsed time that is allowed in addition, for waiting. It limits the reading where the system
+# cannot limit processor time.
 _WAIT_S = 300.0
-_SET_UP_S = 60.0
+_SET_UP_S = 60.0  # for the start of the worker
 
 
 def _load() -> None:
@@ -80,11 +83,12 @@ def read_in_worker(path: Path, read: Callable[[Path, T], R], argument: T) -> R:
     trailer = read_trailer(path)
     if is_worker() or trailer.digest in _trusted or path.parent == REFERENCES:
         return read(path, argument)
-    regions = [region for columns in trailer.groups.values() for region in columns.values()]
-    size = path.stat().st_size - sum(length for _, length in regions)
+    size = path.stat().st_size
+    for columns in trailer.groups.values():
+        size -= sum(length for _, length in columns.values())
     seconds = TIME_S + TIME_OF_BYTE_S * size
     memory = int(MEMORY + MEMORY_OF_BYTE * size)
-    is_over_limit = True
+    is_over_limit = True  # unless the worker returns
     with suppress(TaskLostError):
         try:
             value, is_over_limit = _worker.run(
@@ -94,7 +98,8 @@ def read_in_worker(path: Path, read: Callable[[Path, T], R], argument: T) -> R:
                 return cast(R, value)
         except MemoryError:  # of this process, which receives what was read
             is_over_limit = False
-    # Under a smaller limit of the caller's own, the end of the worker says nothing of the file.
+    # If the memory of this process is limited to less, so is the worker's, and its end says nothing
+    # of the file.
     if not is_over_limit or address_space() < memory:
         raise ResourceError(f"{path}: not enough memory to read it{memory_limit_text()}")
     limits = f"{seconds:.3g} s or {memory / 2**30:.3g} GB"

@@ -30,7 +30,7 @@ from rotor_mbs.runs.versions import versions
 from rotor_mbs.scenario.catalogue import REFERENCES, SCENARIOS, find_scenes
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.studies.bench import Curve, curve_of, curve_tables, curve_tasks
-from rotor_mbs.studies.run import BatchReport, asked_runs, missing_runs
+from rotor_mbs.studies.run import BatchReport, missing_runs, requested_runs
 
 # The scene whose error and run time are measured by all methods: the paper's own crest, and a
 # horizon of 6 s.
@@ -71,12 +71,14 @@ def reproduce(
         methods[scene.name], others = supporting_methods(scene, names, {}, are_named=False)
         refused += others
     curves = short_curves(benched)
-    asked = asked_runs(scenes, methods, {})
+    requests = requested_runs(scenes, methods, {})
     with locked(output), pool_of(workers) as pool:
         file = fit_file_to_request(
-            output, [*results_tables(asked), *curve_tables(curves)], [curve.key for curve in curves]
+            output,
+            [*results_tables(requests), *curve_tables(curves)],
+            [curve.key for curve in curves],
         )
-        runs, stored = missing_runs(file, asked, timeout_s)
+        runs, stored = missing_runs(file, requests, timeout_s)
         labels = {task.label for task in runs}
         is_new = f"{benched.name} {REFERENCE}" in labels
         unmeasured = [curve for curve in curves if is_new or not curve.is_stored(file)]

@@ -1,4 +1,4 @@
-"""Runs of scenes: solved, judged against a reference, and stored in a results file."""
+"""Solve runs of scenes, judge them against a reference, and store them in a results file."""
 
 from __future__ import annotations
 
@@ -46,8 +46,8 @@ from rotor_mbs.studies.stored_references import frozen_solution, read_reference,
 # Short runs are repeated, so that the stored time is not that of a cold cache; long ones are not.
 _REPEATS = 5
 _REPEAT_BUDGET_S = 0.05
-_JUDGING_S = 1.0
-_FIXED_WORK = 3.0  # building, judging, storing
+_JUDGING_S = 1.0  # at least, to judge a run after the time limit was reached
+_FIXED_WORK = 3.0  # of building, judging and storing a run, see `work_of`
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,17 +56,17 @@ class RunTask(Task):
 
     Attributes
     ----------
-    asked : the run.
+    request : the run.
     time_limit_s : s, after which the run ends itself.
     """
 
-    asked: RunRequest
+    request: RunRequest
     time_limit_s: float
 
     def failed(self, status: str, message: str) -> Rows:
         """Return the row of the run without samples, with a status and its reason."""
-        asked = self.asked
-        run = without_samples(asked.scene, asked.method, asked.settings, status, message)
+        request = self.request
+        run = without_samples(request.scene, request.method, request.settings, status, message)
         limit = self.time_limit_s if status == "timed_out" else np.nan
         return row_of_run(run, self.place, {"false_success": 0, "time_limit_s": limit})
 
@@ -81,28 +81,31 @@ class RunTask(Task):
         MethodRefusal
             If the method cannot represent the scene.
         """
-        asked, end = self.asked, time.monotonic() + self.time_limit_s
-        shipped = frozen_solution(asked.scene) if asked.is_shipped else None
+        request = self.request
+        end = time.monotonic() + self.time_limit_s
+        shipped = frozen_solution(request.scene) if request.is_shipped else None
         try:
-            run = shipped or solve(
-                asked.method,
-                asked.scene,
-                asked.settings,
-                _REPEATS,
-                _REPEAT_BUDGET_S,
-                self.time_limit_s,
-            )
+            if shipped is not None:
+                run = shipped
+            else:
+                run = solve(
+                    request.method,
+                    request.scene,
+                    request.settings,
+                    _REPEATS,
+                    _REPEAT_BUDGET_S,
+                    self.time_limit_s,
+                )
         except (*SYSTEM_ERRORS, MethodRefusal):
             raise
         except OutOfTimeError as exc:  # from a method that cannot be stopped with its samples
             return self.failed("timed_out", str(exc))
         except Exception as exc:
-            return self.failed(
-                "solver_failed", str(exc) if isinstance(exc, RotorError) else error_line(exc)
-            )
-        reference = run.trajectory if asked.method == REFERENCE else None
+            message = str(exc) if isinstance(exc, RotorError) else error_line(exc)
+            return self.failed("solver_failed", message)
+        reference = run.trajectory if request.method == REFERENCE else None
         if self.reference is not None:
-            reference = read_reference(self.reference, asked.scene)
+            reference = read_reference(self.reference, request.scene)
         run, false_success = _judged(run, reference, end)
         limit = self.time_limit_s if run.status == "timed_out" and shipped is None else np.nan
         return row_of_run(
@@ -111,15 +114,14 @@ class RunTask(Task):
 
     def outcome(self, rows: Rows) -> RunOutcome:
         """Return the outcome that is stored in the row of the run."""
-        seconds = float("nan") if self.asked.is_shipped else float(rows["run_time_s"][0])
-        status, message = STATUSES[int(rows["status"][0])], text_of(rows["message"][0])
+        is_shipped = self.request.is_shipped
         return RunOutcome(
             self.label,
             self.method,
-            status,
-            message,
-            seconds=seconds,
-            is_shipped=self.asked.is_shipped,
+            STATUSES[int(rows["status"][0])],
+            text_of(rows["message"][0]),
+            seconds=math.nan if is_shipped else float(rows["run_time_s"][0]),
+            is_shipped=is_shipped,
         )
 
 
@@ -138,7 +140,7 @@ def work_of(scene: Scene, method: str) -> float:
 
 @dataclass(frozen=True)
 class BatchReport:
-    """Hold the outcomes of a list of runs: computed by this call, and stored already."""
+    """Hold the outcomes of the runs of a call: those that it computed, and those stored before."""
 
     computed: list[RunOutcome]
     stored: list[RunOutcome]
@@ -147,7 +149,7 @@ class BatchReport:
     def failures(self) -> list[RunOutcome]:
         """Return the runs that should have succeeded and did not.
 
-        How far the printed equations get is data, not a failure.
+        The printed equations cannot fail: how far their runs get is a result.
         """
         return [
             run
@@ -203,14 +205,14 @@ def run_scenes(
     InputError, StoreError, KeyboardInterrupt
         The same call then continues where it stopped.
     """
-    asked = asked_runs(scenes, methods, settings or {}, use_frozen=use_frozen)
+    requests = requested_runs(scenes, methods, settings or {}, use_frozen=use_frozen)
     with locked(output), pool_of(workers) as pool:
-        file = fit_file_to_request(output, results_tables(asked))
-        tasks, stored = missing_runs(file, asked, timeout_s)
+        file = fit_file_to_request(output, results_tables(requests))
+        tasks, stored = missing_runs(file, requests, timeout_s)
         return BatchReport(run_tasks_references_first(tasks, pool, on_progress), stored)
 
 
-def asked_runs(
+def requested_runs(
     scenes: Sequence[Scene],
     methods: Mapping[str, Sequence[str]],
     settings: Mapping[str, object],
@@ -234,29 +236,24 @@ def asked_runs(
     InputError
         For unknown methods, and settings of a scene that no method has.
     """
-    asked: list[RunRequest] = []
+    requests: list[RunRequest] = []
     for scene in scenes:
-        runs = [
-            RunRequest(scene, name, settings_of_run(scene, name, settings))
-            for name in methods[scene.name]
-        ]
-        digest = scene_hash(scene)
-        asked += [
-            RunRequest(scene, REFERENCE, versions=shipped_versions(digest) if use_frozen else None),
-            *runs,
-        ]
-    return asked
+        shipped = shipped_versions(scene_hash(scene)) if use_frozen else None
+        requests.append(RunRequest(scene, REFERENCE, versions=shipped))
+        for name in methods[scene.name]:
+            requests.append(RunRequest(scene, name, settings_of_run(scene, name, settings)))
+    return requests
 
 
 def missing_runs(
-    file: TableFile, asked: Sequence[RunRequest], timeout_s: float
+    file: TableFile, requests: Sequence[RunRequest], timeout_s: float
 ) -> tuple[list[RunTask], list[RunOutcome]]:
     """Return which runs are to be computed, and mark their rows in the file as missing.
 
     Parameters
     ----------
-    file : has a row for each run.
-    asked : the runs, of each scene the reference first.
+    file : the results file, with a row for each run.
+    requests : the runs, of each scene the reference first.
     timeout_s : time limit of a run (s).
 
     Returns
@@ -271,14 +268,16 @@ def missing_runs(
     stored: list[RunOutcome] = []
     references: dict[str, RowLocation] = {}  # by label
     new_references = set[str]()
-    for run in asked:
+    for run in requests:
         place = file.place(run.label)
         row = place.read()
         status = STATUSES[row["status"][0]] if place.is_stored else ""
-        # A shipped reference that ended early has no time limit stored, unless reading it took too
-        # long.
+        # The time limit that ended the stored run; NaN if none did. A shipped reference whose own
+        # samples end early has none and stays; only if reading it took too long it has one.
         limit = row["time_limit_s"][0]
-        is_short = limit < timeout_s if run.is_shipped else not limit >= timeout_s
+        is_short = not limit >= timeout_s
+        if run.is_shipped:
+            is_short = limit < timeout_s
         is_over = status == "timed_out" and is_short
         is_missing = not status or is_over or run.reference_label in new_references
         reference = references.get(run.reference_label)
@@ -290,7 +289,8 @@ def missing_runs(
             message = text_of(row["message"][0])
             stored.append(RunOutcome(f"{run.scene.name} {run.method}", run.method, status, message))
             continue
-        if (row["status"][0], row[STATUS_COPIES["status"]][0]) != (MISSING, MISSING):
+        copied_status = row[STATUS_COPIES["status"]][0]
+        if row["status"][0] != MISSING or copied_status != MISSING:
             place.mark_missing([0])
         tasks.append(
             RunTask(
@@ -302,7 +302,7 @@ def missing_runs(
                 # compile before, and to write its row after.
                 kill_after_s=1.2 * timeout_s + 10.0,
                 work=work_of(run.scene, run.method),
-                asked=run,
+                request=run,
                 time_limit_s=timeout_s,
             )
         )
@@ -320,7 +320,7 @@ def solve_judged(
 ) -> tuple[Solution, Trajectory | None]:
     """Solve and judge one run in this process; nothing is stored.
 
-    The time limit is for the run, then the reference, then the judging.
+    The run, the reference and the judging share the time limit, in this order.
 
     Parameters
     ----------
@@ -340,7 +340,8 @@ def solve_judged(
     Errors raised and an example: `rotor_mbs.run`.
     """
     end = time.monotonic() + time_limit_s
-    shipped, is_short = frozen_solution(scene), False
+    shipped = frozen_solution(scene)
+    is_reference_short = False
     reference = None if shipped is None else shipped.trajectory
     own = own_settings(scene, method) | dict(settings or {})
     try:
@@ -350,11 +351,12 @@ def solve_judged(
     if reference is None and compute_reference:
         try:
             solution = solve(REFERENCE, scene, {}, time_limit_s=max(end - time.monotonic(), 0.0))
-            reference, is_short = solution.trajectory, solution.integration.out_of_time
+            reference = solution.trajectory
+            is_reference_short = solution.integration.out_of_time
         except OutOfTimeError:
-            is_short = True
+            is_reference_short = True
     run, _ = _judged(run, reference, end)
-    if is_short and run.status != "timed_out":
+    if is_reference_short and run.status != "timed_out":
         run = replace(
             run,
             status="timed_out",
@@ -370,16 +372,14 @@ def _judged(run: Solution, reference: Trajectory | None, end: float) -> tuple[So
     ----------
     run : a run as its method returned it.
     reference : of its scene; None without one.
-    end : time limit on the monotonic clock, s. What was reached by then is judged in one second
-        more.
+    end : time limit on the monotonic clock, s. After it there is one second left to judge a run.
     """
     try:
         with time_limit(max(end - time.monotonic(), _JUDGING_S)):
             judgement = judge(run.scene, run, reference)
     except OutOfTimeError as exc:
-        return replace(
-            run, status="timed_out", message=f"{exc}, while its samples were assessed"
-        ), False
+        message = f"{exc}, while its samples were assessed"
+        return replace(run, status="timed_out", message=message), False
     advice = judgement.advice or next_to_try(run.scene, run.method, run.settings, judgement.status)
     message = judgement.message + advice
     trajectory = run.trajectory
@@ -401,9 +401,9 @@ def _with_defects(samples: Trajectory, defects: Defects) -> Trajectory:
     It is NaN at the first sample, and where the defect is not finite.
     """
     sizes = np.concatenate([[np.nan], defects.sizes])
-    known = samples.replace(**{DEFECT: np.where(np.isfinite(sizes), sizes, np.nan)})
-    known.refined = samples.refined
-    return known
+    with_defects = samples.replace(**{DEFECT: np.where(np.isfinite(sizes), sizes, np.nan)})
+    with_defects.refined = samples.refined
+    return with_defects
 
 
 def next_to_try(scene: Scene, method: str, settings: Mapping[str, object], status: str) -> str:

@@ -37,7 +37,7 @@ REFERENCE, FIRST = f"{SCENE.name}/reference", f"{SCENE.name}/{METHODS[0]}"
 
 def blank(task: RunTask) -> Rows:
     """A row without samples in place of a run."""
-    return task.failed("ok", task.asked.method)
+    return task.failed("ok", task.request.method)
 
 
 def run(path: Path, methods: Sequence[str] = METHODS, **options: object) -> BatchReport:
@@ -132,7 +132,7 @@ def test_references_come_first_and_what_is_stored_is_skipped(tmp_path: Path) -> 
 
 
 def without_memory(task: RunTask) -> Rows:
-    if task.asked.method == "reference":
+    if task.request.method == "reference":
         raise MemoryError("no room")
     return blank(task)
 
@@ -193,7 +193,9 @@ def test_a_damaged_row_is_computed_again_by_the_same_command(tmp_path: Path, col
 def test_a_run_that_a_shorter_limit_ended_is_computed_again(tmp_path: Path) -> None:
     def slow(task: RunTask) -> Rows:
         return (
-            task.failed("timed_out", "too slow") if task.asked.method == METHODS[0] else blank(task)
+            task.failed("timed_out", "too slow")
+            if task.request.method == METHODS[0]
+            else blank(task)
         )
 
     run(tmp_path / "r.h5", perform=slow, timeout_s=5.0)
@@ -222,7 +224,7 @@ def test_a_shipped_reference_that_was_not_read_in_time_is_read_again(tmp_path: P
     def slow(task: RunTask) -> Rows:
         return (
             task.failed("timed_out", "too slow")
-            if task.asked.method == "reference"
+            if task.request.method == "reference"
             else blank(task)
         )
 
