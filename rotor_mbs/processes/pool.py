@@ -33,7 +33,8 @@ _SIGNALS_OF_END = [
     getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
 ]
 _PER_WORKER = 2  # tasks submitted per worker: one to work on, one waiting
-_MAX_LACKS = 10  # in a row, before all is given up
+# Tasks in a row that fail as the system lacks memory, files or processes, before all are given up.
+_MAX_SYSTEM_FAILURES = 10
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +79,7 @@ class TaskPool(ABC):
         """Return why a future failed: "timed_out", "worker_died", or "error" of the task itself."""
         return error.failure if isinstance(error, TaskLostError) else "error"
 
-    def close(self) -> None:  # noqa: B027  (of this process there is nothing to end)
+    def close(self) -> None:  # noqa: B027  (a pool in this process has nothing to end)
         """End the workers."""
 
     def __enter__(self) -> Self:
@@ -94,8 +95,8 @@ Workers: TypeAlias = int | TaskPool  # how many processes, or a pool that is ope
 class WorkerPool(TaskPool):
     """Worker processes, each of which keeps its state between tasks.
 
-    Each starts when there is a task for it; with an initializer, as many as there are cores start
-    at once. One that dies, or is ended at a time limit, is replaced.
+    A process starts when there is a task for it; with an initializer, as many as there are cores
+    start with the pool. One that dies, or is ended at a time limit, is replaced.
 
     Parameters
     ----------
@@ -186,9 +187,8 @@ class SerialPool(TaskPool):
             with system_errors_apart():
                 future.set_result(work(task))
         except (Exception, SystemExit) as exc:  # also of another package's method
-            future.set_exception(
-                RuntimeError(one_line(exc)) if isinstance(exc, SystemExit) else exc
-            )
+            is_exit = isinstance(exc, SystemExit)
+            future.set_exception(RuntimeError(one_line(exc)) if is_exit else exc)
         return future
 
 
@@ -237,8 +237,8 @@ def run_in(
 ) -> Iterator[TaskEnd[T, R]]:
     """Call `work(task)` for all tasks in a pool that is open, and yield how each ended.
 
-    A task whose worker died is tried once more at the end, alone. One that can be split is split
-    first, also if it exceeded its time limit.
+    If a task exceeds its time limit or its worker dies, and it can be split, its parts are tried. A
+    task that cannot be split and whose worker died is tried once more at the end, alone.
 
     Parameters
     ----------
@@ -255,8 +255,8 @@ def run_in(
         If several tasks in a row fail for lack of memory, files or processes, or as code cannot be
         loaded.
     """
-    again: dict[str, list[T]] = {"timed_out": [], "worker_died": []}
-    lacks = 0
+    retries: dict[str, list[T]] = {"timed_out": [], "worker_died": []}  # by failure
+    system_failures = 0  # in a row
 
     def completed(tasks: Iterable[T], at_once: int) -> Iterator[TaskEnd[T, R]]:
         waiting: dict[Future[R], T] = {}
@@ -269,27 +269,29 @@ def run_in(
             yield from ended(waiting)
 
     def ended(waiting: dict[Future[R], T]) -> Iterator[TaskEnd[T, R]]:
-        nonlocal lacks
+        nonlocal system_failures
         done = wait(waiting, return_when=FIRST_COMPLETED).done
-        # Of several in the order of their tasks.
+        # If several have ended, in the order in which they were submitted.
         for future in [future for future in waiting if future in done]:
             end = _end_of(waiting.pop(future), future, pool)
-            is_lack = end.failure == "worker_died" and end.error is not None
-            lacks = lacks + 1 if is_lack else 0
-            if lacks >= _MAX_LACKS:
-                count = f"{lacks} failures in a row"
+            is_system_failure = end.failure == "worker_died" and end.error is not None
+            system_failures = system_failures + 1 if is_system_failure else 0
+            if system_failures >= _MAX_SYSTEM_FAILURES:
+                count = f"{system_failures} failures in a row"
                 raise ResourceError(f"stopped after {count}: {end.message}; stored runs are kept")
             yield end
 
-    for source in (tasks, again["timed_out"]):
+    for source in (tasks, retries["timed_out"]):
         for end in completed(source, _PER_WORKER * pool.workers):
-            parts = split(end.task) if split is not None and end.failure in again else ()
+            parts: Sequence[T] = ()
+            if split is not None and end.failure in retries:
+                parts = split(end.task)
             if parts or end.failure == "worker_died":
-                again[end.failure].extend(parts or [end.task])
+                retries[end.failure].extend(parts or [end.task])
             else:
                 yield end
     # One at a time: no other task then takes the memory that one of these may need.
-    for end in completed(again["worker_died"], 1):
+    for end in completed(retries["worker_died"], 1):
         if end.failure == "worker_died":
             yield replace(end, message=f"{end.message}, also when it was retried alone")
         else:

@@ -49,8 +49,8 @@ class TaskLostError(RotorError):
 
     Attributes
     ----------
-    failure : "timed_out" if it exceeded its time limit, "worker_died" if its process died, or was
-        ended at the time limit where it may have waited for memory.
+    failure : "timed_out" if it exceeded its time limit; "worker_died" if its process died, or if it
+        exceeded the time limit while this process has a memory limit, for which it may have waited.
     exit_code : of a process that died by itself, negative for the number of a signal; None for one
         that was ended at the time limit.
     """
@@ -120,7 +120,7 @@ class Worker:
         Raises
         ------
         ResourceError
-            If the system cannot start a process, after a pause, or this worker is closed.
+            If this worker is closed, or the system cannot start a process (after a pause).
         """
         with self._lock:
             if self._process is not None and self._process.poll() is not None:
@@ -129,7 +129,7 @@ class Worker:
             if self._is_closed:
                 raise ResourceError("a process could not be started: its pool is closed")
             if self._process is None:
-                self._process = self._started()
+                self._process = self._start_process()
             return self._process
 
     def run(self, work: Callable[[T], R], task: T, timeout_s: float) -> R:
@@ -161,7 +161,7 @@ class Worker:
                 if not process.is_set_up:
                     self._wait_until_set_up(process)
                 answer = process.exchange(pickle.dumps((folder, request)), timeout_s)
-            except BaseException:  # a later answer would be taken for the next one
+            except BaseException:  # its late answer would be taken for that of the next task
                 if process is not None:
                     process.end()
                 raise
@@ -188,7 +188,7 @@ class Worker:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _started(self) -> _Process:
+    def _start_process(self) -> _Process:
         """Start a process and send it the request to set itself up.
 
         Raises
@@ -204,7 +204,8 @@ class Worker:
                 beginning = _starter(os.getpid()).submit(self._begin)
             except RuntimeError as exc:
                 raise _not_started(str(exc)) from exc
-            # Its error is asked for, not raised: what is raised here is this process's own.
+            # The error of the start is asked for, not raised: what is raised here is another error,
+            # such as an interrupt.
             done, _ = wait([beginning], self._set_up_limit_s)
             if not done:
                 raise _not_started(f"the system did not start it in {self._set_up_limit_s:g} s")
@@ -213,7 +214,8 @@ class Worker:
                 time.sleep(_RETRY_START_S)
                 raise _not_started(str(error)) from error
             process = beginning.result()
-            process.send(pickle.dumps(("", pickle.dumps((self._set_up, self._initializer)))))
+            request = pickle.dumps((self._set_up, self._initializer))
+            process.send(pickle.dumps(("", request)))  # in the folder in which it starts
         except BaseException:
             if beginning is not None:  # no caller waits for it any more
                 beginning.add_done_callback(_end_begun)
@@ -222,7 +224,7 @@ class Worker:
 
     def _begin(self) -> _Process:
         """Start a process. Raises OSError."""
-        # Its own folder last: Python may have found this package by a path that is relative.
+        # The package's folder is added, as Python may have found it by a relative path.
         folders = [*map(str, sys.path), str(Path(__file__).parents[2])]
         return _Process(
             [sys.executable, "-P", "-c", _PROGRAM, *folders],
@@ -318,12 +320,13 @@ class _Process(subprocess.Popen[bytes]):
                     send(self.stdin, request)
                 answer = pickle.load(self.stdout)
             except Exception as exc:
-                # Most errors of a pipe are signs of an end. But a handler of a signal may raise
-                # any type, and memory may be lacking here: that says nothing of the process.
+                # An error of a pipe mostly means that the process has ended. A signal handler, or
+                # a lack of memory here, may raise any error, which says nothing of the process.
                 if not is_late.is_set() and not self._ends(exc):
                     raise
-        if is_late.is_set():  # also in the moment of its answer
-            # What lacks memory may wait for it without end: that says nothing of the task.
+        if is_late.is_set():  # even if it answered at the same moment
+            # Under a memory limit a process may wait for memory without end: the time says nothing
+            # of the task.
             limit = memory_limit_text()
             failure = "worker_died" if limit else "timed_out"
             raise TaskLostError(f"ended after {timeout_s:g} s{limit}", failure)
@@ -392,7 +395,7 @@ class _Process(subprocess.Popen[bytes]):
         """
         self.returncode = 0  # it is no child of this process
         for stream in (self.stdin, self.stdout):
-            # The buffer's own lock may be held by a thread that there is not in this process.
+            # Raw, as the buffer's lock may be held by a thread that was not copied by the fork.
             cast(Any, stream).raw.close()
 
 
@@ -414,8 +417,8 @@ def _not_started(reason: str) -> ResourceError:
 def _starter(_process_id: int) -> ThreadPoolExecutor:
     """Return the thread of a parent process that starts its workers.
 
-    Linux ends a worker when the thread that started it ends, which must be no thread of a caller;
-    and processes started by a thread that does not receive Ctrl-C do not, from their first moment.
+    Linux ends a worker when the thread that started it ends: that must not be a caller's thread.
+    This one blocks Ctrl-C, and so do the processes that it starts, from their first moment on.
     """
     from concurrent.futures import ThreadPoolExecutor  # late: `rotor-mbs list` starts no process
 
