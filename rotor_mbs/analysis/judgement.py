@@ -1,11 +1,13 @@
-"""The one judgement of a run, from its samples, by the checks and bounds that `check` reads, too.
+"""Judge a run by its samples, with the checks and bounds of `rotor-mbs check`.
 
-ok: what a run has is right over the whole of what was asked. Times and start are the scene's, tips
-and energies those of its angles and rates, loads those of the closed form at its state; every
-interval's defect is within the method's bound, the energy balance is kept, and the error of the
-angles up to the horizon is at most 0.01 rad (from the reference, or predicted from the defects). An
-engine's report can only lower a status. The printed equations are "completed" where they reach the
-end: nothing is claimed of them.
+A run is ok if it reaches the end of the scene and all that it stores is right. Its times and
+initial state are the scene's. Its tips and energies are those of its angles and rates, its loads
+those of the closed form at its states. Every interval's defect is within the method's bound, and
+the energy balance is kept. The error of the angles up to the horizon, from the reference or
+predicted from the defects, is at most 0.01 rad.
+
+An engine's report can only lower a status. Runs of the printed equations that reach the end are
+"completed": nothing is claimed of them.
 """
 
 from __future__ import annotations
@@ -37,16 +39,18 @@ from rotor_mbs.solution.quantities import Array
 from rotor_mbs.solution.status import OK_ERROR
 from rotor_mbs.solution.trajectory import Integration, Solution, Trajectory
 
-# A run is checked where one of these could be found.
+# A run that has none of these metrics cannot be judged.
 _CHECKS = ("energy_drift_max", "defect_max", "angle_error_max")
 
-# A claim of success is not false while a run resembles the motion: its energy drift (of the energy
-# scale), its defects (rad) and the errors of its quantities (relative to their scales) are below a
-# hundredth, and its angle error up to the horizon is below one radian.
+# An engine's claim of success of an inaccurate run is not called false if the run resembles the
+# motion. Then its energy drift (relative to the energy scale), its defects (rad) and the errors of
+# its quantities (relative to their scales) are at most the first of these numbers, and its angle
+# error up to the horizon (rad) is at most the second.
 _RESEMBLES = 1e-2
 _RESEMBLING_ANGLE = 1.0
 
-# Share of the rotor's inertia at the start: above it no initial state is singular.
+# An initial state is not singular if its share of the rotor's inertia, see
+# `smallest_rotor_inertia_share`, is larger.
 _CLEAR_SHARE = 1e-6
 
 
@@ -81,7 +85,7 @@ def defects_of(scene: Scene, run: Trajectory) -> Defects | None:
 
 
 def bounds_of(method: str) -> Bounds:
-    """Return the bounds by which a status is judged in any scene, a method's own first."""
+    """Return the bounds by which runs of a method are judged: its own precede the shipped ones."""
     known = find_method_or_none(method)
     return shipped_bounds().with_entries(known.bounds if known else ())
 
@@ -288,11 +292,11 @@ def _too_far_apart(defects: Defects, count: int) -> str:
 
 
 def smallest_rotor_inertia_share(scene: Scene, run: Trajectory) -> float:
-    """Return the smallest S / (rotor inertia) about the last sample of a run.
+    """Return the smallest share of the rotor's inertia near the last sample of a run.
 
-    It is taken over the straight line from the last sample to the next one. S = J_hub + Σ (a -
-    b²/Jzz) is the rotor's inertia with every pitch free to give way: m (c² + d²) cos²θ for point
-    masses.
+    The share is S / (rotor inertia). S = J_hub + Σ (a - b²/Jzz) is the rotor's inertia if every
+    pitch is free to give way; the summand of a point mass is m (c² + d²) cos²θ. The smallest share
+    on the straight line from the last sample to the next one is returned.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
-"""Metrics of a run: its distance from a reference, its energy error, its defects.
+"""Compute the metrics of a run: its distance from a reference, its energy error, its defects.
 
-Runs, reports and checks have the same ones.
+Runs, reports and checks use the same metrics.
 
 `METRICS` declares each of them once: its unit, and which tables of a file have it.
 """
@@ -41,7 +41,7 @@ class RowValue:
     tables : names of the tables that have it, separated by blanks: "runs", "bench", "stability",
         "sweep", and "sweep_growth" for sweeps that ask for the error growth.
     kind : its type in the file; "S1" for a text.
-    rounding : by how many times the `defect_floor` of a run it may differ on other hardware.
+    rounding : on other hardware the value may differ by this many times the run's `defect_floor`.
     is_main : whether it is shown first of all.
     """
 
@@ -54,7 +54,7 @@ class RowValue:
 
 
 _OWN_POINTS = "of printed/ode45 over ode45's own output points instead"
-_ALL, _BENCH = "runs bench stability", "runs bench"
+_ALL, _BENCH = "runs bench stability", "runs bench"  # see `RowValue.tables`
 # Each metric, in the order of the columns. Those of quantities are declared with them, see
 # `Quantity`.
 METRICS = {
@@ -165,8 +165,8 @@ METRICS = {
 # 1e-9 rad is meaningful.
 ANGLE_LIMIT = 1e6
 
-# rad: between these the departure grows exponentially; below is round-off, above the motion is no
-# longer linear.
+# rad: a pitch angle that leaves zero grows exponentially between these sizes. Below them it is
+# round-off, above them its motion is no longer linear.
 _LINEAR_FROM, _LINEAR_TO = 1e-12, 1e-2
 
 
@@ -314,7 +314,7 @@ def defect_metrics(
     Parameters
     ----------
     defects : of the run.
-    horizon_s : of the reference; None without a reference: that of the run itself.
+    horizon_s : that of the reference; None to find it from the defects.
     is_corrected : see `metrics_of`.
     """
     floor = defects.floor
@@ -360,7 +360,7 @@ def interval_metrics(defects: Defects, interval: int, *, is_corrected: bool = Tr
     ----------
     defects : of the run.
     interval : number of the interval, from 0.
-    is_corrected : whether excess and judged value are added to its end.
+    is_corrected : whether the excess and the judged value are returned beside the interval's end.
     """
     metrics = {"defect_time": float(defects.time[1 + interval])}
     if is_corrected:
@@ -372,8 +372,8 @@ def interval_metrics(defects: Defects, interval: int, *, is_corrected: bool = Tr
 def _angle_errors(run: Trajectory, reference: Trajectory, until: int) -> Metrics:
     """Return the metrics of the errors of angles.
 
-    The first sample is given and equal in every run: those up to the horizon or over the run need a
-    second one.
+    The first sample is given and equal in every run, so that an error up to the horizon or over the
+    run needs a second sample.
 
     Parameters
     ----------
@@ -413,7 +413,9 @@ def largest(values: Array) -> Array:
 
     Samples that are not finite are ignored.
     """
-    result: Array = np.abs(np.maximum(values.max(axis=1), -values.min(axis=1)))  # of zeros: not -0
+    result: Array = np.abs(
+        np.maximum(values.max(axis=1), -values.min(axis=1))
+    )  # abs turns -0 into 0
     if not np.isfinite(result).all():
         magnitudes = np.abs(values)
         result = magnitudes.max(axis=1, initial=0.0, where=np.isfinite(magnitudes))

@@ -1,4 +1,4 @@
-"""Samples and results of runs.
+"""Define what a run returns and what is known of it: samples, engine's report, solution.
 
 A model returns samples by quantity, the engine's report, and equations linearized about a steady
 state. A Python user has a `Solution`: scene, method, samples, status, numbers, times.
@@ -36,9 +36,10 @@ from rotor_mbs.solution.status import OK_ERROR, comparison
 class Trajectory:
     """Hold the samples of a run at equally spaced times, up to its end: n rows, all finite.
 
-    Angles and rates have the shape (n, 1 + blades), angles unwrapped; those of a file that does not
-    have them are NaN. Other quantities are in `quantities` by name; built-in ones are also
-    attributes, None if the scene does not request them or the model does not compute them.
+    Angles and rates have the shape (n, 1 + blades), angles unwrapped. If they are read from a file
+    that does not have them, they are NaN. Other quantities are in `quantities` by name; built-in
+    ones are also attributes, None if the scene does not request them or the model does not compute
+    them.
 
     Parameters
     ----------
@@ -47,7 +48,7 @@ class Trajectory:
     quantities : (n, ...) arrays by name; None is left out.
     """
 
-    # An array that is set elsewhere than in `quantities` would not be found.
+    # No other attribute can be set: an array must be in `quantities` to be found.
     __slots__ = ("angles", "quantities", "rates", "refined", "time")
 
     def __init__(
@@ -62,9 +63,8 @@ class Trajectory:
 
     def get(self, name: str) -> Array | None:
         """Return a quantity by name, or the time; None if the run does not have it."""
-        return {"time": self.time, "angles": self.angles, "rates": self.rates}.get(
-            name, self.quantities.get(name)
-        )
+        arrays = {"time": self.time, "angles": self.angles, "rates": self.rates}
+        return arrays[name] if name in arrays else self.quantities.get(name)
 
     def replace(self, **changes: Array | None) -> Trajectory:
         """Return a copy with other arrays, without `refined`; None removes an array.
@@ -80,8 +80,8 @@ class Trajectory:
         return Trajectory(**{**arrays, **changes})
 
     def __getattr__(self, name: str) -> Any:
-        # A quantity is an attribute, so that models and metrics read `run.work` whoever declared
-        # it. The type is not `Array | None`: what the scene asks for is there.
+        # Models and metrics read `run.work`, whichever package declared the quantity. The type is
+        # not `Array | None`, as an array that the scene requests is there.
         if name in NAMES:
             return self.quantities.get(name)
         raise AttributeError(f"a trajectory has no attribute {name!r}")
