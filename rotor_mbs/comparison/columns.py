@@ -1,4 +1,4 @@
-"""Named columns of numbers with units, into which every file and all arrays in memory are read."""
+"""Define named columns of numbers with units, the form in which all data are read."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ class DataColumn(NamedTuple):
     values : (n,) as they stand in the file, NaN where one is missing.
     unit : that the file states, "" where it states none.
     step : between numbers that are packed as integers, in the same unit; 0 where they are not.
-    missing : what stands in place of the first number that is missing, and where, in words: "empty
-        in row 2 of 9 (line 3)"; "" where the file's own text is not known.
+    missing : what the file has in place of the first number that is missing, and where: "empty in
+        row 2 of 9 (line 3)"; "" if the file's text is not known.
     """
 
     values: NDArray[np.float64]
@@ -63,8 +63,8 @@ class DataTable:
     columns : by name, in the order of the file.
     left_out : by name what else is in the file.
     program : that wrote the file, as its head says: "openfast", or "".
-    headers : by the name of a column that has another one in the file, as an earlier column has it:
-        that name.
+    headers : for each column that was renamed, as an earlier column has its name: the name in the
+        file.
     """
 
     source: str

@@ -1,4 +1,4 @@
-"""Data of a scene in SI units, from files or arrays, with the rounding of each number.
+"""Load data of a scene in SI units from files or arrays, with the rounding of each number.
 
 Data that cannot be compared are refused here: not finite, of different lengths, times that do not
 increase.
@@ -29,12 +29,12 @@ from rotor_mbs.solution.trajectory import Array
 
 _FEW_DIGITS, _SURE_DIGITS, _ALL_DIGITS = 9, 14, 17
 _MAX_WRITTEN = 20_000  # numbers that are written with some digits, evenly chosen: 1 us each
-_ROUNDED_SINCE = 2.0 * 2.0**-52  # of a number
+_ROUNDED_SINCE = 2.0 * 2.0**-52  # relative: what a later factor of units changes in a number
 _SINGLE_DIGITS = 8  # as many as single precision has
 _SINGLE = 2.0**-24  # its relative rounding error
 _MAX_EXCEPTIONS = 0.05  # of the numbers
-_MIN_DISTINCT = 10  # values: fewer may have been chosen, and say nothing of digits
-_SAMPLE = 200  # numbers of a column, at least, where not all are needed
+_MIN_DISTINCT = 10  # values: fewer may be input, such as 0.5, that says nothing of the digits
+_SAMPLE = 200  # about as many numbers of a column are used where not all are needed
 
 
 @dataclass(frozen=True)
@@ -53,9 +53,9 @@ class ForeignData:
     unused : by name of every other column, why it is not compared.
     loads_left_out : names of the loads among the unused columns that the mapping does not omit.
     wrapped : for each channel, whether whole turns are missing from it.
-    precision : "4 decimals: rounding error 5e-05", or the like of digits; "" of numbers with hardly
-        any rounding.
-    time_precision : of the times likewise, "" where that of the numbers matters more.
+    precision : "4 decimals: rounding error 5e-05", or a number of digits in this form; "" if the
+        numbers have hardly any rounding.
+    time_precision : the same of the times, "" if that of the numbers matters more.
     notes : what was done to the rows.
     omitted : names of channels that are not to be missed.
     restricted_to : names of the channels to which the mapping restricts the comparison; empty where
@@ -352,7 +352,7 @@ def rounding_of_printed(
     # Numbers with a fixed number of decimals may seem to have a fixed number of digits, and the
     # other way round: both are tried, and the coarser rounding is taken.
     last = np.zeros(len(values))
-    noise = 4.0 * 2.0**-52 * largest  # of the arithmetic
+    noise = 4.0 * 2.0**-52 * largest  # errors of the arithmetic below
     for decimals in range(_SURE_DIGITS + 1):
         unit = 10.0**-decimals
         # Any number fits a unit that is not far above the errors of the arithmetic.

@@ -29,22 +29,27 @@ from rotor_mbs.models.lagrange.defects import FIT_ROWS, explicit_steps, quick_en
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.trajectory import Array
 
-# Share of the largest defect that may be left, by the other program's own error and that of the
-# quick steps; the second share where this is within the tolerance.
+# Shares of the largest defect that an explanation may leave, for the other program's own error and
+# that of the quick steps. The second one holds as long as what is left is within the tolerance.
 _LEFT, _LEFT_OF_SMALL = 1e-3, 0.15
-_LEFT_OF_FITTED = {1: 0.02, 2: 2e-3, 3: 2e-3}  # of the largest defect, by numbers that are fitted
+# The same share by the number of fitted parameters.
+_LEFT_OF_FITTED = {1: 0.02, 2: 2e-3, 3: 2e-3}
 _ALIKE = 3.0  # times what the best explanation leaves
 _ALIKE_IN_ROUNDING = 1.05
 _QUICK = 3e-5  # relative error of a change of the model by quick steps
-# Factor of the number of steps with which that holds also where the mass matrix is nearly singular,
-# and the number of steps that limits the factor, so that a search does not take minutes.
+# Factor of the number of steps, so that this error holds also where the mass matrix is nearly
+# singular; and the number of steps to which the factor leads at most, to save time.
 _MOST_FINE, _FINE_STEPS = 8, 32
-_PERHAPS = 0.2  # largest share of the defects that a model may leave by coarse steps
-_OF_RESCALED = 0.3  # times what a model leaves that is left by another multiple of its effect
+_PERHAPS = 0.2  # share of the defects that a model leaves at most, by coarse steps, to be tried
+_OF_RESCALED = (
+    0.3  # times what a model leaves: the most that a better multiple of its effect leaves
+)
 _LEFT_OF_SETS = 0.1  # share left by the projections on several parameters, before they are fitted
 _FAR_BETTER = 0.1  # times what a cheaper explanation leaves
 _SIGNIFICANT = 8.0  # standard deviations of an estimate
-_CERTAIN = 10.0  # factor by which all others leave more than a textbook mistake that is the cause
+_CERTAIN = (
+    10.0  # times what a textbook mistake leaves: others leave more if it is certainly the cause
+)
 _MAX_CHANGE = 0.6  # a share, or rad: what is further off is another scene
 _MAX_FITTED = 8  # sets of parameters, those whose projections leave least
 _MAX_PARAMETERS = 3  # at once

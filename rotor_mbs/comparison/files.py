@@ -1,7 +1,7 @@
-"""A file of another program as columns, read by a process of its own with limits.
+"""Read a file of another program as columns, in a process of its own with limits.
 
-What a file holds is decided by others: it may be damaged, or made to harm. Every format is read
-apart, so that a file that ends a library's process, keeps it busy or fills its memory is one line
+What a file holds is decided by others: it may be damaged, or made to harm. Every format is read in
+that process, so that a file that ends it, keeps it busy or fills its memory is an error of one line
 here.
 """
 

@@ -1,4 +1,4 @@
-"""Loads of another program against the closed form's at the data's own states; likely causes."""
+"""Compare loads of another program with the closed form's at the data's states; find causes."""
 
 from __future__ import annotations
 
@@ -24,15 +24,17 @@ from rotor_mbs.solution.defects import FLOOR_SAFETY, Defects
 from rotor_mbs.solution.quantities import LOADS, longest_arm
 from rotor_mbs.solution.trajectory import Array, all_coordinates
 
-# Share of the largest force at a root: the errors of smaller components are divided by this, not by
-# the component's own largest value.
+# Share of the largest force at a root. The errors of a component that is smaller are divided by
+# this share, not by the component's own largest value.
 _SMALL = 1e-3
 _LOAD_ROUNDING = 16.0 * 2.0**-53  # of that force: rounding of the sums by which a load is computed
 _STATE_STEP = 1e-7  # relative step of a state, for the derivative of the loads
 _FEW_ROWS = 50  # in which another scene is tried first
 MIN_EXPLAINED = 5  # rows: with fewer, something always fits
-MAX_LEFT = 1e-4  # of the largest load, or of a frequency, by a mistake that is named,
-LEFT_SHARE = 1e-2  # and of the difference: another program's own error is no mistake
+# What a mistake that is named may leave: shares of the largest load, or of a frequency, and of the
+# difference. It is the other program's own error.
+MAX_LEFT = 1e-4
+LEFT_SHARE = 1e-2
 WHOLE = LoadParts()
 _FORGOTTEN = {
     "without the weight": LoadParts(weight=0.0),
@@ -75,7 +77,7 @@ class Component:
     factor : the column is this factor times `values`.
     values : (n,) N or N m.
     shown : " is <name>" if it is another component than the column's name says, else "".
-    is_shifted : whether it is moved by a row, so that the first and the last row are not known.
+    is_shifted : whether it is late or early by a row, so that its first or last row is unknown.
     """
 
     factor: float
@@ -93,7 +95,7 @@ class JudgedLoads:
     scene, channels : the scene, and the channels of the data.
     known : all components of loads of the scene, as the columns of `by_frame`.
     by_frame : by frame the (n, components) loads of the closed form.
-    mistaken : by a mistake, in words, the loads by frame that a program with it computes.
+    mistaken : for each mistake, in words, the loads by frame that a program with this mistake has.
     hub_weight : by frame the share of the hub's weight in the loads.
     time : (n,) s.
     states : (n, 2 moving) angles and rates of the data, rad and rad/s.
@@ -129,7 +131,7 @@ class JudgedLoads:
         return max(largest, float(self.smallest_scale[j])) or 1.0
 
     def left(self, j: int, component: Component, *, may_vanish: bool = False) -> float:
-        """Return the error that is left, less the allowed one, if a channel is a component.
+        """Return how far the error of a channel, taken as a component, exceeds the allowed one.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""Which column is which channel, in which unit, sign and zero: from a mapping file, or by names.
+"""Find which column is which channel, its unit, sign and zero, from a mapping file or by names.
 
 A channel is sign * (column + offset), the offset in the column's own unit. A mapping replaces
 single channels, or adds to those that are recognized by the names of columns. See docs/compare.md.

@@ -1,4 +1,4 @@
-"""The rows of a motion in the order of their times, and the rounding of the times.
+"""Order the rows of a motion by their times, and find the rounding of the times.
 
 Programs write a row twice at an event, rows of an initialisation before t = 0, rows from the end to
 the start. Repeated rows are dropped; rows that contradict each other are refused.

@@ -1,4 +1,4 @@
-"""A trajectory of another program, with its loads, against the reference at its own times."""
+"""Compare a trajectory of another program, and its loads, with the reference at its times."""
 
 from __future__ import annotations
 
@@ -50,12 +50,12 @@ from rotor_mbs.solution.metrics import horizon, horizon_samples
 from rotor_mbs.solution.status import OK_ERROR
 from rotor_mbs.solution.trajectory import Array, Trajectory
 
-_TIME_ROUNDING = 1e-9  # of the duration: times that are sums of steps may end this much after it
+_TIME_ROUNDING = 1e-9  # of the duration, by which times that are sums of steps may exceed it
 _MIN_ROWS = 3
 _STAGES = 4  # reference, interval defects, search for causes, loads
 _SAME_START = 1e-3  # rad, rad/s: starts that differ by more are another start
-_LEFT_OF_SMALL = 0.02  # of errors within the tolerance, by a cause that explains them
-_MAX_GAP = 1.5  # intervals that may be missing at the start or end of the motion
+_LEFT_OF_SMALL = 0.02  # share of errors within the tolerance that a cause may leave
+_MAX_GAP = 1.5  # largest number of intervals without rows at the start or end of the motion
 
 
 @dataclass(frozen=True)
@@ -70,10 +70,12 @@ class ReferencedRows:
     places : (rows,) rows of `exact` at the times of the data.
     reference : reference at the rows.
     expected : (rows, channels) what the channels of `compared` should be.
-    until, horizon_s : rows up to the horizon of the scene, and that horizon, s.
-    defects, note : interval defects of the data, None where unknown; what a reader must know.
-    rounding, of_times : (rows, channels) half a digit of each number, with what half a digit of its
-        time makes of it; and the share of the times alone.
+    until : number of rows up to the horizon of the scene.
+    horizon_s : this horizon, s.
+    defects : interval defects of the data, None if unknown.
+    note : what a user must know of them.
+    rounding : (rows, channels) half a unit in the last digit of each number, plus `of_times`.
+    of_times : (rows, channels) change of each number by half a unit in the last digit of its time.
     """
 
     data: ForeignData
@@ -101,9 +103,9 @@ class TrajectoryErrors:
     per_growth : (rows, channels) errors per unit of the growth of an initial error.
     excess_per_growth : (channels,) the largest of these up to the horizon, beyond rounding.
     predicted, defect_time : see `DataVerdict`.
-    drift, drifting : the largest sum of defects over a longer stretch, beyond rounding, rad, and of
-        which channel over how many rows.
-    beyond_digits : the largest defect, or sum over a longer stretch, over its own rounding.
+    drift : rad, the largest sum of defects over a longer stretch of rows, beyond rounding.
+    drifting : its channel and number of rows, in words.
+    beyond_digits : the largest ratio of a defect, or of such a sum, to its own rounding.
     missing : labels of coordinates without a column of angles.
     """
 

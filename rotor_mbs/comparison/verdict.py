@@ -1,4 +1,4 @@
-"""The verdict on data of another program, by channel, and as a record of a results file."""
+"""Define the verdict on data of another program, by channel, and its record in a file."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution.defects import Defects
 from rotor_mbs.solution.trajectory import Array
 
-LEVELS = (1e-3, 1e-6, 1e-9)  # rad, rad/s, or relative: for each, it is found until when data agree
+LEVELS = (1e-3, 1e-6, 1e-9)  # rad, rad/s or relative, see `agrees_until`
 DEFAULT_TOLERANCE = 1e-6  # rad, of an interval's defect; of a load's largest; of a frequency
 # Limits of the names of unused columns in a file: their number, and their length as JSON; an
 # attribute of HDF5 has at most 64 kB.
@@ -34,12 +34,12 @@ class ChannelErrors:
 
     Attributes
     ----------
-    error_max, error_whole : the largest error up to the horizon, and at all.
-    defect : what is judged, less what the rounding of the data explains; None where it cannot be
-        known. Of an angle or a rate (times the interval) the largest over all intervals, rad; of a
-        load the largest error, of the load's largest size; of a frequency the largest error, of its
-        size.
-    floor : the largest that rounding explains, likewise.
+    error_max, error_whole : the largest error up to the horizon, and over all rows.
+    defect : the judged error, less what the rounding of the data explains; None if it is unknown.
+        For an angle or a rate (times the interval) it is the largest defect of an interval, rad;
+        for a load the largest error relative to the load's largest magnitude; for a frequency the
+        largest relative error.
+    floor : the largest such error that rounding explains.
     agrees_until : see the function of this name.
     """
 
@@ -64,12 +64,13 @@ class DataVerdict:
     tolerance : rad, of an interval's defect.
     rows, compared_until, horizon_s : rows compared, time of the last one (s), horizon of the scene
         (s); None of modes.
-    defect_time, predicted : s, end of the interval of the largest defect; rad, the error up to the
-        horizon that the defects add up to; None where they are not known.
-    read, unused, notes : how columns were read; by name of every other column, why it is not
-        compared; what else there is to know.
-    likely : what the difference looks like, of what was tried; empty where nothing fits, or nothing
-        was tried.
+    defect_time : s, end of the interval of the largest defect; None if it is unknown.
+    predicted : rad, the error up to the horizon to which the defects add up; None if it is unknown.
+    read : how columns were read, a line each.
+    unused : by name of every other column, why it is not compared.
+    notes : what else a user should know.
+    likely : likely causes of the difference, in words; empty if none was found or none was searched
+        for.
     axis : "time", or "speed" of a table of modes, whose `compared_until` is in rad/s.
     """
 
