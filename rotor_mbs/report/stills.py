@@ -202,8 +202,8 @@ def _drawn(
 # ---- Paths of the tips
 
 _REACH = 165.0  # px, half of the picture's height
-# px: points of a path that are closer to the last one are left out. The chord of an arc of the largest
-# circle is then 0.01 px from it.
+# px: points of a path that are closer to the last one are left out. On the largest circle the chord
+# is then 0.01 px from the arc.
 _APART = 3.0
 
 
