@@ -23,12 +23,12 @@ from rotor_mbs.runs.read import is_sweep
 from rotor_mbs.scenario.accuracy_bounds import read_bounds, shipped_bounds
 from rotor_mbs.studies import check as study
 
-# Largest number of annotations: GitHub shows ten of a step, and drops the others silently. Also of
-# lines about margins that have shrunk.
+# Largest number of annotations, of which GitHub shows ten of a step and drops the others silently;
+# and of lines about margins that have shrunk.
 WORST = 10
 
 
-# Regular expressions that are found in every output of a kind, see `refuse_foreign`.
+# Regular expressions by which an earlier output of a kind is recognized, see `refuse_foreign`.
 JUNIT = rb'<testsuites name="rotor-mbs check"'
 JSON = rb'\A\[\]\Z|\A\[\n \{\n  "check": "'
 
@@ -85,7 +85,7 @@ def check(arguments: argparse.Namespace) -> int:
             verdicts.append(study.runs_gone(arguments.file, arguments.against))
 
     _write_verdicts(arguments, verdicts)
-    # then standard output has only the JSON
+    # With `--json -` standard output has only the JSON.
     stream = sys.stderr if arguments.json == Path("-") else sys.stdout
     failures = [verdict for verdict in verdicts if not verdict.passed]
     annotated = worst_first(failures)[:WORST] if arguments.github else []
@@ -173,20 +173,21 @@ def test_method(arguments: argparse.Namespace) -> int:
     _write_verdicts(arguments, verdicts)
     if arguments.json != Path("-"):
         rows: list[tuple[str, ...]] = []
-        for one in verdicts:
-            note = "" if one.passed and one.name != "refusal" else one.hint
-            number, bound = (f"{one.value:.1e}", f"{one.bound:.1e}") if one.unit else ("", "")
-            outcome = "pass" if one.passed else "FAIL"
+        for verdict in verdicts:
+            has_note = not verdict.passed or verdict.name == "refusal"
+            number = bound = ""
+            if verdict.unit:
+                number, bound = f"{verdict.value:.1e}", f"{verdict.bound:.1e}"
             rows.append(
                 (
-                    one.where.method,
-                    one.name,
-                    one.where.scene,
+                    verdict.where.method,
+                    verdict.name,
+                    verdict.where.scene,
                     number,
                     bound,
-                    one.unit,
-                    outcome,
-                    note,
+                    verdict.unit,
+                    "pass" if verdict.passed else "FAIL",
+                    verdict.hint if has_note else "",
                 )
             )
         heads = ("method", "check", "scene", "value", "allowed", "unit", "result", "reason")
@@ -239,9 +240,8 @@ def line(check: Check) -> str:
     outcome = "pass" if check.passed else "FAIL"
     margin = "inf" if math.isinf(check.margin) else f"{check.margin:.3g}"
     unit = f" {check.unit}" if check.unit else ""
-    # also an allowed change
-    is_told = not check.passed or (check.name == study.CHANGED and check.value > 0.0)
-    hint = f"; {check.hint}" if is_told else ""
+    is_allowed_change = check.name == study.CHANGED and check.value > 0.0
+    hint = f"; {check.hint}" if not check.passed or is_allowed_change else ""
     return escaped(
         f"{outcome} {check.name}: {' '.join(check.where)}: {check.value:.2e}, bound "
         f"{check.bound:.2e}{unit}, margin {margin}{hint}"
@@ -268,14 +268,15 @@ def as_json(checks: Sequence[Check]) -> str:
     """
     rows = []
     for check in checks:
-        numbers = {"value": check.value, "bound": check.bound, "margin": check.margin}
+        numbers: dict[str, float | None] = {}
+        for name in ("value", "bound", "margin"):
+            number = getattr(check, name)
+            numbers[name] = number if math.isfinite(number) else None
         rows.append(
             {
                 "check": check.name,
                 **check.where._asdict(),
-                **{
-                    name: value if math.isfinite(value) else None for name, value in numbers.items()
-                },
+                **numbers,
                 "unit": check.unit,
                 "passed": check.passed,
                 "hint": check.hint,
