@@ -246,8 +246,8 @@ class Method:
         method of each model. Raises MethodRefusal for a state about which the model cannot be
         linearized.
     arrays : names of optional quantities that it stores, such as "constraint_error".
-    sources : source files of a method of another package, or the text of a method file; a run is
-        computed again if they change.
+    sources : source files of a method of another package, or the text of a method file;
+        their digest is stored with each run.
     import_engine : imports the packages that the method needs, and switches off caches of code that
         earlier processes compiled; called before a timing.
     """

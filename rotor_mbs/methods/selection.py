@@ -109,8 +109,8 @@ def problems_of_methods(values: Mapping[str, Any]) -> list[KeyProblem]:
 def problems_of_scene(values: Mapping[str, Any]) -> list[KeyProblem]:
     """Return what is wrong with the `methods` and `settings` of a scene file.
 
-    Each setting must be one of any method. Those of a sweep file are checked elsewhere: they must
-    be settings of the methods that the sweep is run with.
+    A setting must be one that some method has. Those of a sweep file are checked elsewhere: they
+    must be settings of the methods that the sweep is run with.
     """
     problems = problems_of_methods(values)
     settings = dict(values.get("settings", ()))
@@ -175,7 +175,7 @@ def supporting_methods(
     refused: list[Refusal] = []
     for name in names:
         method = find_method(name)
-        # A method of a user's file raises InputError for any error in its code.
+        # `items` of a method file raises InputError for any error in the file's code.
         try:
             method.items(scene)
         except (MethodRefusal, InputError) as exc:
@@ -403,7 +403,7 @@ def _leaves_zero_pitch(scene: Scene) -> bool:
     _, y, _ = scene.blades[0].centre_of_mass
     starts_at_zero = scene.initial_angles[1] == 0.0 and scene.initial_rates[1] == 0.0
     leans = scene.blades[0].cone != 0.0 or (scene.shaft_tilt != 0.0 and scene.gravity != 0.0)
-    # A blade in the plane of rotation has no moment about its pitch axis.
+    # Gravity and the rotor's motion turn no pitch if the blade is in the plane of rotation.
     is_in_plane = y == 0.0 and not leans
     stays = is_in_plane and starts_at_zero and not scene.pitch_torque
     return not stays and not any(scene.bearing_stiffness)

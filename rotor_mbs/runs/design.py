@@ -338,7 +338,7 @@ class TableSpec:
 
     @functools.cached_property
     def row_of(self) -> Mapping[str, int]:
-        """Return the number of the row of each run, by run."""
+        """Return the number of each row, by its label."""
         return {str(run): row for row, run in enumerate(self.runs)}
 
 

@@ -30,7 +30,7 @@ def fit_file_to_request(
 
     Parameters
     ----------
-    path : the results file; of a symbolic link the file that it points to.
+    path : the results file; a symbolic link is followed, and stays one.
     wanted : the tables that are requested.
     replaced : (group, scene, curve or method) of stored rows that are dropped unless they
         are in `wanted`.
@@ -48,7 +48,7 @@ def fit_file_to_request(
     StoreError
         If the file cannot be read or written.
     """
-    if path.is_symlink():  # a link stays one
+    if path.is_symlink():
         path = path.resolve()
     if not may_extend(path, RESULTS):
         return _write_tables(path, wanted, [])
@@ -69,12 +69,13 @@ def fit_file_to_request(
             )
     if lost:
         raise InputError(lost)
+    # Tables with a row per run or point: their stored rows, then the requested ones.
     merged: dict[str, TableSpec] = {}
-    kept: list[tuple[str, str]] = []
+    kept: list[tuple[str, str]] = []  # group and label of the stored rows that are copied
     for group in dict.fromkeys((*stored, *wanted_tables)):
         before, requested = stored.get(group), wanted_tables.get(group)
         base = requested or stored[group]
-        # Tables of a scene's arrays have no checksums; they follow below from the runs that stay.
+        # A table of a scene's arrays has no checksums; it follows below from the rows of /runs.
         if "crc32" not in base.computed:
             continue
         requested_rows = _known_rows(requested)
@@ -94,6 +95,7 @@ def fit_file_to_request(
                 known[name] = column, [rows[run][name] for run in runs]
             columns = _joined_columns(before, requested)
             merged[group] = TableSpec(group, runs, known, columns, base.attributes, base.characters)
+    # Tables of the scenes' arrays: a row for each run that /runs has now.
     methods: dict[str, list[str]] = {}  # by scene
     if RUNS in merged:
         for run, scene in zip(merged[RUNS].runs, merged[RUNS].known["scene"][1], strict=True):

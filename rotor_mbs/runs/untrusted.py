@@ -2,9 +2,9 @@
 
 A digest is no signature: a forged file can have a right one. The library follows the trees, heaps
 and headers of a file as they are. Some forged files end the process that reads them, and others are
-read without end, or fill the memory. So a worker process reads a file and returns plain values, and
-only the worker is lost. Without it are read files that this process wrote, and those that came with
-the program.
+read without end, or fill the memory. A worker process therefore reads each file and returns plain
+values: a forged file ends only the worker. Files that this process wrote, and those that came with
+the program, are read without it.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ def prepare_reading() -> None:
 
 
 def trust(digest: bytes) -> None:
-    """Add the digest in the trailer of a file that this process writes to the trusted ones."""
+    """Trust the file whose trailer has this digest, as this process writes it."""
     _trusted.add(digest)
 
 
