@@ -115,9 +115,9 @@ def again(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., bool]:
         assert ("nothing to do" in ended.out) == (not done)
         return bool(done)
 
-    monkeypatch.setattr(runs, "reproduce_paper", compute)
+    monkeypatch.setattr(reproduce, "reproduce", compute)
     monkeypatch.setattr(runs, "print_summary", lambda *_: int(Path("fails").exists()))
-    monkeypatch.setattr(runs, "summary_of", lambda _: "result as printed: what came out\n")
+    monkeypatch.setattr(reproduce, "summary_of", lambda _: "result as printed: what came out\n")
     monkeypatch.setattr("rotor_mbs.report.build.write_report", write)
     return called
 
