@@ -23,6 +23,10 @@ from typing import NamedTuple
 
 ROOT = Path(__file__).resolve().parents[1]
 COMMAND = [sys.executable, "-m", "rotor_mbs"]
+# A user's installation has bytecode.
+ENVIRONMENT = {
+    name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"
+}
 REPEATS = 15  # of calls in a process
 ROUNDS = 3  # of short commands
 
@@ -64,7 +68,9 @@ def measured(command: list[str], folder: Path) -> Usage:
     """
     start = time.monotonic()
     with tempfile.TemporaryFile() as printed:
-        process = subprocess.Popen(command, cwd=folder, stdout=printed, stderr=subprocess.DEVNULL)
+        process = subprocess.Popen(
+            command, cwd=folder, env=ENVIRONMENT, stdout=printed, stderr=subprocess.DEVNULL
+        )
         _, status, usage = os.wait4(process.pid, 0)
         printed.seek(0)
         output = printed.read().decode()
@@ -191,6 +197,8 @@ if __name__ == "__main__":
     asked = sys.argv[1:] or ["targets", "growth"]
     if unknown := set(asked) - set(parts):
         sys.exit(f"unknown: {', '.join(unknown)}; allowed: {', '.join(parts)}")
+    compiling = [sys.executable, "-m", "compileall", "-q", str(ROOT / "rotor_mbs")]
+    subprocess.run(compiling, env=ENVIRONMENT, check=True)
     print(f"load before: {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")
     with tempfile.TemporaryDirectory() as temporary:
         for name in asked:
