@@ -59,8 +59,12 @@ def likely_causes(search: TrajectorySearch, judged: JudgedDefects | None) -> lis
     elif has_defects:
         texts = _other_models_or_faults(search, judged)
     texts = texts or _scatter(search, first) or column_mistakes(search, with_factor=True)
-    if not texts and judged is not None and has_defects and is_elsewhere:
-        texts = _other_models_or_faults(search, judged)
+    if not texts and judged is not None and is_elsewhere:
+        starts_at_zero = bool(len(first.time)) and first.time[0] == 0.0
+        if starts_at_zero and judged.largest <= judged.tolerance:
+            return ["another initial state, and the right motion from there"]
+        if has_defects:
+            return _other_models_or_faults(search, judged)
     return texts
 
 

@@ -58,6 +58,15 @@ def _trapezoidal(derivative: Derivative, time: Array, state: Array, h: Array) ->
     return end
 
 
+def _velocity_verlet(derivative: Derivative, time: Array, state: Array, h: Array) -> Array:
+    """Return the state after a step of Verlet's method, by the rates at half the step."""
+    half = len(state) // 2
+    rates = state[half:] + 0.5 * h * derivative(time, state)[half:]
+    angles = state[:half] + h * rates
+    accelerations = derivative(time + h, np.concatenate([angles, rates]))[half:]
+    return np.concatenate([angles, rates + 0.5 * h * accelerations])
+
+
 # The method, and the largest number of its steps from row to row that is tried.
 _METHODS: dict[str, tuple[Step, int]] = {
     "explicit Euler method": (_euler, 100),
@@ -66,6 +75,7 @@ _METHODS: dict[str, tuple[Step, int]] = {
     "Heun's method": (_heun, 20),
     "explicit midpoint rule": (_midpoint, 20),
     "trapezoidal rule": (_trapezoidal, 20),
+    "velocity Verlet method": (_velocity_verlet, 20),
     "classical Runge-Kutta method": (runge_kutta_step, 4),
 }
 

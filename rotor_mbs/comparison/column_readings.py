@@ -46,6 +46,9 @@ _MIN_STEPS = 10  # distinct numbers: fewer do not show a step
 _MAX_STEPS = 1 << 20  # in the range of a column: with more, steps are not coarse
 _MAX_DIVISIONS = 12  # of Euclid's algorithm
 _WHOLE = 1e-3  # of a step: a number of steps this near to a whole one is taken as whole
+_EQUAL_STEPS = 1e-6  # relative
+_MIN_SHARE = 0.01  # of a filter, from row to row
+_MAX_ROUNDING = 0.02  # of a difference that a filter explains
 _TRUNCATED = (("rounded", 0.5), ("cut off", 1.0))  # the error of a step, in steps
 
 
@@ -124,7 +127,7 @@ class ColumnReadings:
         if reading is not None:
             return reading
         # Differences, means and late rows are nearly alike in a slow motion: all are compared.
-        kinds = (self._late_rows, self._steps, self._limits, self._sums, self._held)
+        kinds = (self._late_rows, self._steps, self._limits, self._sums, self._held, self._filtered)
         processed = itertools.chain.from_iterable(
             kind(j) for kind in (*kinds, self._differences, self._means)
         )
@@ -328,12 +331,41 @@ class ColumnReadings:
     def _held(self, j: int) -> Iterator[Reading]:
         """Yield the reading of a column whose numbers are held for some rows."""
         values = self.data.values[:, j]
-        changes = np.flatnonzero(np.diff(values)) + 1
-        period = int(np.gcd.reduce(changes)) if len(changes) else 1
+        period = held_rows(values[:, None])
         if period > 1:
             held = np.full(len(values), np.nan)
             held[::period] = values[::period]
             yield self._inverse(j, f"{HELD} for {period} rows", held)
+
+    def _filtered(self, j: int) -> Iterator[Reading]:
+        """Yield the reading of a column behind a filter of first order, from the first row on.
+
+        Such a filter moves a number by a share of the distance from the row before to the right
+        one: the share follows by least squares, and the right numbers from the data.
+
+        Parameters
+        ----------
+        j : number of the column.
+        """
+        values, rounding = self.data.values[:, j], self.data.rounding[:, j]
+        steps = np.diff(self.data.time)
+        if np.ptp(steps) > _EQUAL_STEPS * steps[0]:
+            return
+        here, expected = values[self._rows], self._expected(j)
+        distances = expected[1:] - here[:-1]
+        share = float(np.diff(here) @ distances) / (float(distances @ distances) or 1.0)
+        if not _MIN_SHARE < share < 1.0 - _MIN_SHARE:
+            return
+        right, growing = values.copy(), rounding.copy()
+        right[1:] = values[:-1] + np.diff(values) / share
+        growing[1:] = (2.0 / share - 1.0) * np.maximum(rounding[1:], rounding[:-1])
+        # The rounding grows: where it is as large as the difference, it would explain anything.
+        if not FLOOR_SAFETY * growing.max() <= _MAX_ROUNDING * np.abs(here - expected).max():
+            return
+        constant = float(-np.median(steps) / np.log1p(-share))
+        text = f"smoothed by a filter of first order, time constant {constant:.3g} s"
+        left = self._left(j, expected, right[self._rows], FLOOR_SAFETY * growing[self._rows])
+        yield Reading(text, left, right, growing)
 
     def _differences(self, j: int) -> Iterator[Reading]:
         """Yield readings of differences of angles in place of a rate.
@@ -426,6 +458,15 @@ class ColumnReadings:
                 means = np.full(len(time), np.nan)
                 means[is_inside] = fine_values[places[is_inside]] @ weight
                 yield text, means
+
+
+def held_rows(values: Array) -> int:
+    """Return for how many rows each of (n, columns) numbers is held, 1 where it is not."""
+    changes = np.flatnonzero(np.diff(values, axis=0).any(axis=1)) + 1
+    if not len(changes):
+        return 1
+    # The first number may be held for less: those of the nearest of every few rows are.
+    return int(np.gcd.reduce(np.diff(changes))) if len(changes) > 1 else int(changes[0])
 
 
 def _step_between(values: Array) -> float | None:

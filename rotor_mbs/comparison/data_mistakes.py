@@ -14,7 +14,12 @@ from scipy.interpolate import make_interp_spline
 from scipy.optimize import linear_sum_assignment
 
 from rotor_mbs.comparison.channels import channels
-from rotor_mbs.comparison.column_readings import HELD, LATE_OR_EARLY, ColumnReadings
+from rotor_mbs.comparison.column_readings import (
+    HELD,
+    LATE_OR_EARLY,
+    ColumnReadings,
+    held_rows,
+)
 from rotor_mbs.comparison.data import ForeignData
 from rotor_mbs.comparison.data_defects import (
     AT_FLOOR,
@@ -51,11 +56,12 @@ _TIME_ROUNDING = 1e-9  # of the duration
 _MIN_COVERED = 0.3  # of the duration: in a short part of a motion anything fits
 _MAX_PERIOD = 20  # rows from one that is computed to the next
 _FIRST_ROWS, _NEARLY_BETWEEN = 401, 1e-6
-_MAX_ROUNDING = 0.02  # of a difference that a filter explains
-_MIN_SHARE = 0.01  # of a filter from row to row
 _MIN_KNOTS = 5  # fewer rows are on one polynomial, or nearly so
 _NOT_BY_CHANCE = 10.0  # times what is allowed of rows: distance of the right ones from a spline
 _INTERPOLATED = 1e-9  # of the largest number: error of the arithmetic of interpolation
+# Long data are first searched in some windows of rows: what explains all rows explains these, by a
+# bound that is this much wider, as errors differ from window to window.
+_WINDOWS, _WINDOW_ROWS, _WIDER = 3, 500, 10.0
 
 
 @dataclass(frozen=True)
@@ -96,8 +102,11 @@ class TrajectorySearch:
         states = states_of(run)[before]
         count = len(self.scene.initial_angles)
         columns = [*moving, *(count + i for i in moving)]
-        moved = interval_ends(self.scene, run.time[before], time, states[:, columns])
-        states[:, columns] = moved
+        begins = run.time[before]
+        between = np.flatnonzero(begins < time)
+        places = between[:, None], np.array(columns)
+        moved = interval_ends(self.scene, begins[between], time[between], states[places])
+        states[places] = moved
         return states
 
     def up_to_horizon(self, data: ForeignData) -> ForeignData:
@@ -204,7 +213,7 @@ def column_mistakes(
     """
     data = times.change if times is not None else search.data
     inside = search.up_to_horizon(data)
-    if len(inside.time) < MIN_ROWS:
+    if len(inside.time) < MIN_ROWS or not _may_explain(search, inside, with_factor=with_factor):
         return []
     hypotheses = _column_hypotheses(search, data, inside, with_factor=with_factor)
     # Columns without a mistake explain the data only together with a mistake in the times.
@@ -228,7 +237,6 @@ def _row_hypotheses(search: TrajectorySearch) -> Iterator[Hypothesis[ForeignData
     yield from _rows_between(search)
     if not search.is_within_tolerance:
         yield from _lags(search)
-        yield from _smoothed(search)
     data = search.data
     reversed_time = (data.time[0] + data.time[-1] - data.time)[::-1]
     backward = replace(data.rows(slice(None, None, -1)), time=reversed_time)
@@ -271,8 +279,7 @@ def _rows_between(search: TrajectorySearch) -> Iterator[Hypothesis[ForeignData]]
     """
     data = search.data
     count = len(data.time)
-    changes = np.flatnonzero(np.diff(data.values, axis=0).any(axis=1)) + 1
-    period = int(np.gcd.reduce(changes)) if len(changes) else 1
+    period = held_rows(data.values)
     if period > 1:
         text = f"every row is held for {period} rows"
         yield Hypothesis(text, data.rows(slice(0, None, period)))
@@ -351,39 +358,6 @@ def _lags(search: TrajectorySearch) -> Iterator[Hypothesis[ForeignData]]:
         side = "late" if lag > 0.0 else "early"
         text = f"a constant lag of {lag:.6g} s{in_rows} ({side}): `offset = {-lag:.6g}` of the time"
         yield Hypothesis(text, replace(data, time=data.time - lag))
-
-
-def _smoothed(search: TrajectorySearch) -> Iterator[Hypothesis[ForeignData]]:
-    """Yield the data without a filter of first order in all channels, from the first row on.
-
-    Such a filter moves a number by a share of the distance from the row before to the right one:
-    the share follows by least squares, and the right numbers from the data.
-
-    Parameters
-    ----------
-    search : the data and the reference.
-    """
-    data, inside = search.data, search.up_to_horizon(search.data)
-    steps = np.diff(data.time)
-    if len(inside.time) < MIN_ROWS or np.ptp(steps) > _TIME_ROUNDING * data.time[-1]:
-        return
-    right = search.states_at(inside.time)[:, data.columns]
-    sizes = np.maximum(np.ptp(right, axis=0), search.tolerance)
-    changes = np.diff(inside.values, axis=0) / sizes
-    distances = (right[1:] - inside.values[:-1]) / sizes
-    share = float((changes * distances).sum() / ((distances**2).sum() or 1.0))
-    if not _MIN_SHARE < share < 1.0 - _MIN_SHARE:
-        return
-    values, rounding = data.values.copy(), data.rounding.copy()
-    values[1:] = data.values[:-1] + np.diff(data.values, axis=0) / share
-    rounding[1:] = (2.0 / share - 1.0) * np.maximum(data.rounding[1:], data.rounding[:-1])
-    # The rounding grows: where it is as large as the difference itself, it would explain anything.
-    difference = float(np.abs(inside.values - right).max())
-    if not FLOOR_SAFETY * float(rounding.max()) <= _MAX_ROUNDING * difference:
-        return
-    constant = float(-np.median(steps) / np.log1p(-share))
-    text = f"smoothed by a filter of first order, time constant {constant:.4g} s"
-    yield Hypothesis(text, replace(data, values=values, rounding=rounding))
 
 
 def _clocks(search: TrajectorySearch) -> Iterator[Hypothesis[ForeignData]]:
@@ -465,7 +439,50 @@ def _column_hypotheses(
     if float((error / carried[:, columns]).max()) <= search.allowed:
         yield Hypothesis("", Correction(data), price=0)
         return
-    readings = ColumnReadings(
+    corrected = _corrected_channels(
+        _readings(search, data, states, carried, with_factor=with_factor)
+    )
+    if corrected is not None:
+        yield corrected
+    chosen, largest = _nearest_channels(inside, states, carried)
+    if largest <= search.allowed and chosen != columns:
+        yield _exchange(search.scene, data, chosen)
+
+
+def _may_explain(search: TrajectorySearch, inside: ForeignData, *, with_factor: bool) -> bool:
+    """Return whether mistakes in the columns may explain long data, from some of their rows.
+
+    Parameters
+    ----------
+    search : the reference, and what may be left.
+    inside : rows of the data up to the horizon.
+    with_factor : whether a channel may be wrong by any factor.
+    """
+    count = len(inside.time)
+    if count <= _WINDOWS * _WINDOW_ROWS:
+        return True
+    wider = replace(search, tolerance=_WIDER * search.tolerance, worst=_WIDER * search.worst)
+    for first in np.linspace(0, count - _WINDOW_ROWS, _WINDOWS).astype(int):
+        window = inside.rows(slice(first, first + _WINDOW_ROWS))
+        states, carried = search.states_at(window.time), search.carried(window.time)
+        readings = _readings(wider, window, states, carried, with_factor=with_factor)
+        if all(readings.best(j) is not None for j in range(len(window.channels))):
+            continue
+        if _nearest_channels(window, states, carried)[1] > wider.allowed:
+            return False
+    return True
+
+
+def _readings(
+    search: TrajectorySearch,
+    data: ForeignData,
+    states: Array,
+    carried: Array,
+    *,
+    with_factor: bool,
+) -> ColumnReadings:
+    """Return the readings of the columns of data, by what a search allows to be left."""
+    return ColumnReadings(
         data,
         states,
         carried,
@@ -474,20 +491,37 @@ def _column_hypotheses(
         search.tolerance,
         with_factor=with_factor,
     )
-    corrected = _corrected_channels(readings)
-    if corrected is not None:
-        yield corrected
-    # Columns may be exchanged, also rates with angles: each column is assigned another channel, so
-    # that the sum of the logarithms of the errors is least. A sum of the errors would depend on
-    # the largest one alone.
-    differences = np.abs(inside.values[:, :, None] - states[:, None, :])
-    errors = (differences / carried[:, None, :]).max(axis=0)  # (columns, channels)
+
+
+def _nearest_channels(
+    inside: ForeignData, states: Array, carried: Array
+) -> tuple[list[int], float]:
+    """Assign each column the channel that it is nearest to; columns may be exchanged.
+
+    Parameters
+    ----------
+    inside : rows of the data up to the horizon.
+    states, carried : (n, 2 (1 + blades)) the reference and `carried_errors` in these rows.
+
+    Returns
+    -------
+    list of int, float
+        For each column the place of a channel, and the largest error per unit of growth.
+    """
+    # Rates may be exchanged with angles, too. Each column is assigned another channel, so that the
+    # sum of the logarithms of the errors is least: a sum of the errors would depend on the largest
+    # one alone.
+    errors = np.empty((len(inside.columns), states.shape[1]))
+    for j, values in enumerate(inside.values.T):
+        errors[j] = (np.abs(values[:, None] - states) / carried).max(axis=0)
     preference = np.zeros_like(errors)
-    places = range(len(columns))
-    preference[places, columns] = -1e-3  # among equal errors a column keeps its own channel
-    _, chosen = linear_sum_assignment(np.log10(np.clip(errors, 1e-16, 1e16)) + preference)
-    if errors[places, chosen].max() <= search.allowed and list(chosen) != columns:
-        yield _exchange(search.scene, data, list(chosen))
+    places = range(len(errors))
+    preference[places, inside.columns] = -1e-3  # among equal errors a column keeps its own channel
+    sizes = np.log10(np.clip(errors, 1e-16, 1e16)) + preference
+    # Columns are exchanged, or one is written in place of another, too.
+    _, exchanged = linear_sum_assignment(sizes)
+    chosen = min(exchanged, sizes.argmin(axis=1), key=lambda columns: errors[places, columns].max())
+    return chosen.tolist(), float(errors[places, chosen].max())
 
 
 def _corrected_channels(readings: ColumnReadings) -> Hypothesis[Correction] | None:

@@ -190,7 +190,7 @@ class DefectSearch:
         first_row = self._first_row()
         every = itertools.chain(
             rotor_hypotheses(self._scene),
-            by_rows(self._scene, self._judged.defects.time.tolist()),
+            by_rows(self._scene, self._judged.defects.time, self.rows),
             scenes_with_start(self._scene, first_row),
         )
         for hypothesis in every:
@@ -224,20 +224,21 @@ class DefectSearch:
         if model.scene.moving_coordinates != self._moving:
             return np.full_like(self._values, np.inf)
         assert self._steps is not None
-        intervals = self._begins, self._ends, self._states, steps * self._steps
+        intervals = self._begins, self._ends, self._states
         try:
             if model.method is None:
-                ends = quick_ends(model.scene, *intervals, model.accelerations())
+                ends = quick_ends(
+                    model.scene, *intervals, steps * self._steps, model.accelerations()
+                )
             else:
                 # The method's own error is the difference from fine steps, which replace the
                 # scene's own ends: then the errors of the quick steps do not cancel.
-                intervals = (*intervals[:3], model.steps)
-                ends = quick_ends(model.scene, *intervals, step=model.method)
+                ends = quick_ends(model.scene, *intervals, model.steps, step=model.method)
         except RotorError:
             return np.full_like(self._values, np.inf)
         # The difference of two models by the same steps, in which the errors of the steps cancel.
         if steps not in self._ends_of_scene:
-            self._ends_of_scene[steps] = quick_ends(self._scene, *intervals)
+            self._ends_of_scene[steps] = quick_ends(self._scene, *intervals, steps * self._steps)
         change = (ends - self._ends_of_scene[steps]).T
         if self._from_intervals is None:
             return np.asarray(self._values + change / self._judged.units)

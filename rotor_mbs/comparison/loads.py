@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.comparison.channels import Channel, channels
+from rotor_mbs.comparison.column_readings import held_rows
 from rotor_mbs.comparison.data import ForeignData
 from rotor_mbs.comparison.hypotheses import Explanation, Hypothesis, cheapest, explanations
 from rotor_mbs.comparison.other_rotors import other_scenes
@@ -38,11 +39,14 @@ LEFT_SHARE = 1e-2
 WHOLE = LoadParts()
 _FORGOTTEN = {
     "without the weight": LoadParts(weight=0.0),
+    "with twice the weight": LoadParts(weight=2.0),
+    "without the forces of the rates (centrifugal, Coriolis)": LoadParts(rates=0.0),
     "without the accelerations of rotor and pitches": LoadParts(accelerations=0.0),
     "of the weight alone, without inertia forces": LoadParts(accelerations=0.0, rates=0.0),
     "without the inertia of the hub": LoadParts(hub=0.0),
     "without the inertia of the blades about their centres of mass": LoadParts(inertia=0.0),
     "without the dampers of the bearings": LoadParts(dampers=0.0),
+    "without the pitch torques": LoadParts(torques=0.0),
 }
 _UNITS = {1.0: "", 1e-3: "kN taken as N", 1e3: "N taken as kN"}
 _FACTORS = [sign * factor for sign in (1.0, -1.0) for factor in _UNITS]
@@ -317,6 +321,12 @@ def _loads_in_rows(
         mistaken[text] = {
             frame: np.roll(matrix, late, axis=0) for frame, matrix in by_frame.items()
         }
+    period = held_rows(loads.values[: len(time)])
+    if period > 1:
+        held = np.arange(len(time)) // period * period
+        mistaken[f"every row is held for {period} rows"] = {
+            frame: matrix[held] for frame, matrix in by_frame.items()
+        }
     # Of loads that are a row late or early, those of the first and last row are not known.
     is_inside = judged & (np.arange(len(time)) > 0) & (np.arange(len(time)) < len(time) - 1)
     judged_loads = JudgedLoads(
@@ -446,7 +456,9 @@ def _explained(loads: JudgedLoads, wrong: Sequence[int]) -> tuple[str, ...]:
     exchanged = named.pop("", [])  # of another component, with nothing else wrong
     for j, text in of_hub.items():
         named.setdefault(text, []).append(loads.channels[j].name)
-    likely = [f"{', '.join(names)}: {text}" for text, names in named.items()]
+    likely = []
+    for text, names in named.items():
+        likely.append(f"{', '.join(_shared_names(loads, names))}: {text}")
     if exchanged:
         likely.append(f"columns exchanged: {', '.join(exchanged)}")
     return tuple(likely)
@@ -632,6 +644,20 @@ def _shared_texts(
             text = max(reversed(texts), key=lambda text: count[text])
             named.setdefault(text, []).append(f"{loads.channels[j].name}{texts[text]}")
     return named
+
+
+def _shared_names(loads: JudgedLoads, names: Sequence[str]) -> list[str]:
+    """Return names of channels, with the name of a load in place of all its components."""
+    by_load: dict[str, list[str]] = {}
+    for channel in loads.channels:
+        by_load.setdefault(_load(channel).rstrip("0123456789 "), []).append(channel.name)
+    shown = list(names)
+    for load, components in by_load.items():
+        if len(components) > 1 and set(components) <= set(shown):
+            place = shown.index(components[0])
+            shown = [name for name in shown if name not in components]
+            shown.insert(place, load)
+    return shown
 
 
 def _other_point(loads: JudgedLoads, load: str, frame: str, group: Sequence[int]) -> str:

@@ -10,6 +10,7 @@ from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rotor_mbs.comparison.coarse_methods import Step, coarse_methods
 from rotor_mbs.comparison.hypotheses import Hypothesis
@@ -24,7 +25,7 @@ from rotor_mbs.scenario.scene import Blade, Scene, scene_fields
 from rotor_mbs.scenario.time_table import LoadTable, is_constant, value_at
 from rotor_mbs.solution.trajectory import Array
 
-_GRAVITIES = (9.8, 9.80665, 9.81, 9.82, 10.0, 0.0)
+_GRAVITIES = (9.8, 9.80665, 9.81, 9.82, 10.0, 32.174, 0.0)
 # Azimuths and pitch angles that are often chosen as zero, by degrees.
 _QUARTERS = {90: math.pi / 2.0, 180: math.pi, 270: -math.pi / 2.0}
 # Directions of gravity in the base that have the same effect on the motion as those azimuths.
@@ -43,11 +44,15 @@ _FORGOTTEN = {
     "rotor_torque": "the torque of the rotor",
     "pitch_torque": "the pitch torques",
     "bearing_stiffness": "the springs",
+    "bearing_rest": "the rest angles of the springs",
     "bearing_damping": "the dampers of the bearings",
     "shaft_damping": "the damper of the shaft",
     "hub_inertia": "the hub's inertia",
     "shaft_tilt": "the tilt of the shaft",
 }
+# Of these a scene may have negative values; of the others, equations.
+_SIGNED = ("rotor_torque", "pitch_torque", "bearing_rest")
+_DISSIPATING = ("bearing_stiffness", "bearing_damping", "shaft_damping")
 # Fields that no motion depends on, and those that are changed by an angle, not by a share.
 _IN_LOADS_ALONE = ("hub_radius", "hub_mass")
 _LEANING_FIELDS = ("shaft_tilt", "cone")
@@ -64,14 +69,38 @@ _UNITS = {
     "pitch_torque": ("pitch torques", _IN_KILONEWTONS),
     "bearing_stiffness": ("stiffness of the springs", (*_IN_KILONEWTONS, *_PER_DEGREE)),
     "bearing_damping": ("damping of the bearings", (*_IN_KILONEWTONS, *_PER_DEGREE)),
+    "bearing_rest": (
+        "rest angles of the springs",
+        (
+            (math.pi / 180.0, "in rad taken as degrees"),
+            (180.0 / math.pi, "in degrees taken as rad"),
+        ),
+    ),
 }
+_POUND = 0.45359237  # kg
 _LOADS = {
     "rotor_torque": "torque of the rotor",
     "pitch_torque": "pitch torques",
     "bearing_rest": "rest angles of the springs",
 }
 _CYCLES = (2, 5, 10, 20, 50)  # rows, over which a controller may hold its loads
-_DELAYS = (1, 2, 5, 10, 20, 50, 100)  # rows, by which loads may be late
+_DELAYS = (
+    1,
+    2,
+    3,
+    4,
+    5,
+    8,
+    10,
+    15,
+    20,
+    25,
+    30,
+    40,
+    50,
+    75,
+    100,
+)  # rows, by which loads may be late
 # E3 is the power of a term that is zero without E2.
 _ERRATA = ("E1", "E2", "E1 and E2", "E2 and E3", "E1 and E2 and E3")
 
@@ -141,14 +170,22 @@ def rotor_hypotheses(scene: Scene) -> Iterator[Hypothesis[RotorModel]]:
         yield Hypothesis(f"gravity along {sense}y of the base", RotorModel(tilted))
     for text, azimuths in other_azimuths(scene):
         yield Hypothesis(text, RotorModel(scene, azimuths))
-    text = "without the gyroscopic moments ω x J ω about the blades' centres of mass"
-    yield Hypothesis(text, RotorModel(scene, equations=_without_own_gyroscopic_moments(scene)))
-    for terms, reduced in REDUCED_EQUATIONS.items():
+    for terms, reduced in _reduced_equations(scene):
         for text, factor in _FACTORS.items():
             scaled = _with_factor(factor, reduced) if factor else reduced
-            yield Hypothesis(f"{text} the {terms}", RotorModel(scene, equations=scaled))
+            yield Hypothesis(f"{text} {terms}", RotorModel(scene, equations=scaled))
+    for field in _DISSIPATING:
+        without = _equations_of(_scaled_at(scene, [(field,)], -1.0))
+        text = f"opposite sign of {_FORGOTTEN[field]}"
+        yield Hypothesis(text, RotorModel(scene, equations=_with_factor(-1.0, without)))
+    text = "weight of the blades on the pitch axes in the rotor's equation alone"
+    on_axes = replace(scene, blades=tuple(_with_weight_on_axis(blade) for blade in scene.blades))
+    reduced = _with_moments_of(on_axes, rotor=1.0)
+    yield Hypothesis(text, RotorModel(scene, equations=reduced))
     for text, other_equations in _OTHER_EQUATIONS.items():
         yield Hypothesis(text, RotorModel(scene, equations=other_equations))
+    text = "dampers of the bearings that see the rotor's rate, too"
+    yield Hypothesis(text, _damped_by_rotor(RotorModel(scene), 1.0))
     text = "small-angle approximation: sin x = x, cos x = 1"
     yield Hypothesis(text, RotorModel(scene, equations=_small_angles))
     for names in _ERRATA:
@@ -248,16 +285,16 @@ def _reaction_of_dampers(_angles: Any, rates: Any, form: Any, _loads: Any) -> An
     return total, [0.0] * len(form.blades)
 
 
-def _opposite_dampers(_angles: Any, rates: Any, form: Any, _loads: Any) -> Any:
-    """Return the moments that make the bearings' dampers drive."""
-    pairs = zip(form.blades, rates[1:], strict=True)
-    return 0.0, [2.0 * blade.damping * rate for blade, rate in pairs]
-
-
 def _quadratic_dampers(_angles: Any, rates: Any, form: Any, _loads: Any) -> Any:
     """Return the moments that make the bearings' dampers quadratic in the rate, in rad/s."""
     pairs = zip(form.blades, rates[1:], strict=True)
     return 0.0, [blade.damping * rate * (1.0 - np.abs(rate)) for blade, rate in pairs]
+
+
+def _quadratic_shaft_damper(_angles: Any, rates: Any, form: Any, _loads: Any) -> Any:
+    """Return the moment that makes the shaft's damper quadratic in the rate, in rad/s."""
+    moment = form.shaft_damping * rates[0] * (1.0 - np.abs(rates[0]))
+    return moment, [0.0] * len(form.blades)
 
 
 def _sine_springs(angles: Any, rates: Any, form: Any, loads: Any) -> Any:
@@ -269,29 +306,100 @@ def _sine_springs(angles: Any, rates: Any, form: Any, loads: Any) -> Any:
     return 0.0, moments
 
 
-def _gravity_on_pitches(angles: Any, _rates: Any, form: Any, _loads: Any) -> Any:
-    """Return the moments that cancel those of gravity about the pitch axes."""
-    moments = []
-    for blade, theta in zip(form.blades, angles[1:], strict=True):
-        sin_phi = np.sin(angles[0]) * blade.cos_phase + np.cos(angles[0]) * blade.sin_phase
-        arm = blade.weight_x * np.sin(theta) + blade.weight_y * np.cos(theta)
-        moments.append(arm * sin_phi)
-    return 0.0, moments
+def _reduced_equations(scene: Scene) -> Iterator[tuple[str, Accelerations]]:
+    """Yield terms of the equations of motion, and the equations without each.
+
+    Parameters
+    ----------
+    scene : the rotor.
+    """
+    for terms, reduced in REDUCED_EQUATIONS.items():
+        yield f"the {terms}", reduced
+    weightless = replace(scene, gravity=0.0)
+    yield (
+        "gravity in the equations of the pitches",
+        _with_moments_of(weightless, pitches=1.0),
+    )
+    yield "gravity in the rotor's equation", _with_moments_of(weightless, rotor=1.0)
+    terms = "the gyroscopic moments ω x J ω"
+    own = [blade.inertia_tensor for blade in scene.blades]
+    yield f"{terms} about the blades' centres of mass", _without_gyroscopic_moments(scene, own)
+    whole = [
+        _with_inertia(blade, blade.inertia + _steiner(blade)).inertia_tensor
+        for blade in scene.blades
+    ]
+    yield f"{terms} of the blades", _without_gyroscopic_moments(scene, whole)
 
 
-def _weight_off_axis(angles: Any, rates: Any, form: Any, loads: Any) -> Any:
-    """Return the moments that cancel those of weights due to their distances from pitch axes."""
-    rotor: Any = 0.0
-    for blade, theta in zip(form.blades, angles[1:], strict=True):
-        cos_phi = np.cos(angles[0]) * blade.cos_phase - np.sin(angles[0]) * blade.sin_phase
-        arm = blade.weight_x * np.cos(theta) - blade.weight_y * np.sin(theta)
-        rotor = rotor - arm * cos_phi
-    return rotor, _gravity_on_pitches(angles, rates, form, loads)[1]
+def _equations_of(scene: Scene) -> Accelerations:
+    """Return the closed form's equations of a scene, whatever the form they are called with."""
+    own = rotor_form(scene)
+    return lambda angles, rates, _form, *rest: closed_form.accelerations(angles, rates, own, *rest)
 
 
-def _rotor_weight_off_axis(angles: Any, rates: Any, form: Any, loads: Any) -> Any:
-    """Return the rotor's moment that cancels that of weights due to their distances from axes."""
-    return _weight_off_axis(angles, rates, form, loads)[0], [0.0] * len(form.blades)
+def _with_moments_of(other: Scene, *, rotor: float = 0.0, pitches: float = 0.0) -> Accelerations:
+    """Return the closed form's equations with the moments of another scene in some of them.
+
+    Parameters
+    ----------
+    other : the same rotor with other moments, but the same mass matrix.
+    rotor, pitches : 1 where the equations of the rotor or the pitches have the other's moments.
+    """
+    others = _equations_of(other)
+
+    def equations(angles: Any, rates: Any, form: Any, *rest: Any) -> list[Any]:
+        own = closed_form.accelerations(angles, rates, form, *rest)
+        difference = np.array(others(angles, rates, form, *rest)) - own
+        matrix = _MassMatrix(angles, form)
+        on_rotor, *on_pitches = matrix.times(list(difference))
+        moments = [rotor * on_rotor, *(pitches * moment for moment in on_pitches)]
+        return list(own + np.array(matrix.solve(moments)))
+
+    return equations
+
+
+class _MassMatrix:
+    """The mass matrix at some angles: rows are the rotor's, then the pitches'.
+
+    Parameters
+    ----------
+    angles : rad, rotor first.
+    form : the coefficients of the equations.
+    """
+
+    def __init__(self, angles: Any, form: Any) -> None:
+        self.inertia, self.couplings = form.inertia, list[Any]()
+        self._pitches = [blade.pitch_inertia for blade in form.blades]
+        for blade, theta in zip(form.blades, angles[1:], strict=True):
+            s, c = np.sin(theta), np.cos(theta)
+            inertia = blade.inertia_ss * s * s + blade.inertia_cc * c * c + blade.inertia_sc * s * c
+            coupling = blade.coupling_s * s + blade.coupling_c * c
+            if blade.lean:
+                inertia = inertia + blade.lean.inertia_s * s + blade.lean.inertia_c * c
+                coupling = coupling + blade.lean.coupling
+            self.inertia = self.inertia + inertia
+            self.couplings.append(coupling)
+
+    def times(self, accelerations: Sequence[Any]) -> list[Any]:
+        """Return the moments, N m, for accelerations, rad/s²."""
+        rotor, *pitches = accelerations
+        moments = [self.inertia * rotor]
+        for inertia, coupling, pitch in zip(self._pitches, self.couplings, pitches, strict=True):
+            moments[0] = moments[0] + coupling * pitch
+            moments.append(coupling * rotor + inertia * pitch)
+        return moments
+
+    def solve(self, moments: Sequence[Any]) -> list[Any]:
+        """Return the accelerations, rad/s², for moments, N m."""
+        reduced, (moment, *others) = self.inertia, moments
+        for inertia, coupling, other in zip(self._pitches, self.couplings, others, strict=True):
+            reduced = reduced - coupling * coupling / inertia
+            moment = moment - coupling * other / inertia
+        rotor = moment / reduced
+        accelerations = [rotor]
+        for inertia, coupling, other in zip(self._pitches, self.couplings, others, strict=True):
+            accelerations.append((other - coupling * rotor) / inertia)
+        return accelerations
 
 
 def _with_coupling(factor: float) -> Accelerations:
@@ -303,80 +411,45 @@ def _with_coupling(factor: float) -> Accelerations:
     """
 
     def equations(angles: Any, rates: Any, form: Any, *rest: Any) -> list[Any]:
-        rotor, *on_pitches = closed_form.accelerations(angles, rates, form, *rest)
-        whole, moment, eliminated, sides = form.inertia, form.inertia * rotor, 0.0, []
-        for blade, theta, pitch in zip(form.blades, angles[1:], on_pitches, strict=True):
-            s, c = np.sin(theta), np.cos(theta)
-            inertia = blade.inertia_ss * s * s + blade.inertia_cc * c * c + blade.inertia_sc * s * c
-            coupling = blade.coupling_s * s + blade.coupling_c * c
-            if blade.lean:
-                inertia = inertia + blade.lean.inertia_s * s + blade.lean.inertia_c * c
-                coupling = coupling + blade.lean.coupling
-            # What the right mass matrix times the right accelerations is: the other terms.
-            side = coupling * rotor + blade.pitch_inertia * pitch
-            moment = moment + inertia * rotor + coupling * pitch
-            coupling = factor * coupling
-            whole = whole + inertia - coupling * coupling / blade.pitch_inertia
-            eliminated = eliminated + coupling * side / blade.pitch_inertia
-            sides.append((side, coupling, blade.pitch_inertia))
-        turned = (moment - eliminated) / whole
-        return [
-            turned,
-            *((side - coupling * turned) / inertia for side, coupling, inertia in sides),
-        ]
+        matrix = _MassMatrix(angles, form)
+        # The right mass matrix times the right accelerations are the other terms.
+        moments = matrix.times(closed_form.accelerations(angles, rates, form, *rest))
+        matrix.couplings = [factor * coupling for coupling in matrix.couplings]
+        return matrix.solve(moments)
 
     return equations
 
 
-def _gyroscopic_moments(angles: Any, rates: Any, form: Any, _loads: Any) -> Any:
-    """Return the moments that cancel the gyroscopic moments ω x J ω of the blades.
+def _without_gyroscopic_moments(scene: Scene, tensors: Sequence[Array]) -> Accelerations:
+    """Return the closed form's equations without the moments ω x J ω of the blades.
 
     Parameters
     ----------
-    angles, rates : rad and rad/s, rotor first, see `closed_form.accelerations`.
-    form : the coefficients of the equations.
-    _loads : not used.
-
-    Returns
-    -------
-    tuple
-        N m on the rotor, and on each pitch that moves.
+    scene : the rotor.
+    tensors : (3, 3) kg m², J of each blade.
     """
-    rotor: Any = 0.0
-    on_pitches = []
-    for blade, theta, rate in zip(form.blades, angles[1:], rates[1:], strict=True):
-        s, c = np.sin(theta), np.cos(theta)
-        x, y, z = rates[0] * s, rates[0] * c, rate
-        xy, xz, yz = 0.5 * blade.inertia_sc, blade.coupling_s, blade.coupling_c
-        momentum_x = blade.inertia_ss * x + xy * y + xz * z
-        momentum_y = xy * x + blade.inertia_cc * y + yz * z
-        momentum_z = xz * x + yz * y + blade.pitch_inertia * z
-        on_x, on_y = y * momentum_z - z * momentum_y, z * momentum_x - x * momentum_z
-        rotor = rotor + s * on_x + c * on_y
-        on_pitches.append(x * momentum_y - y * momentum_x)
-    return rotor, on_pitches
+    moving = [pitch - 1 for pitch in scene.moving_coordinates[1:]]
 
-
-def _without_own_gyroscopic_moments(scene: Scene) -> Accelerations:
-    """Return equations without the moments ω x J ω, J about the centre of mass of each blade.
-
-    Parameters
-    ----------
-    scene : the rotor. A point mass has none of these moments.
-    """
-    # With J about the apex the moments cancel; those of the masses at their centres are added back.
-    own = rotor_form(scene)
-    points = tuple(_without_inertia(blade) for blade in scene.blades)
-    pairs = zip(scene.blades, points, strict=True)
-    if any(blade.has_pitch_inertia != point.has_pitch_inertia for blade, point in pairs):
-        return closed_form.accelerations
-    of_points = rotor_form(replace(scene, blades=points))
-
-    def moments(angles: Any, rates: Any, _form: Any, loads: Any) -> Any:
-        rotor, on_pitches = _gyroscopic_moments(angles, rates, own, loads)
-        rotor_points, pitch_points = _gyroscopic_moments(angles, rates, of_points, loads)
-        pairs = zip(on_pitches, pitch_points, strict=True)
-        return rotor - rotor_points, [whole - point for whole, point in pairs]
+    def moments(angles: Any, rates: Any, _form: Any, _loads: Any) -> Any:
+        on_rotor: Any = 0.0
+        on_pitches = []
+        for i, theta, rate in zip(moving, angles[1:], rates[1:], strict=True):
+            cone = scene.blades[i].cone
+            # The shaft in the axes of the blade.
+            shaft = np.array(
+                [
+                    math.cos(cone) * np.sin(theta),
+                    math.cos(cone) * np.cos(theta),
+                    math.sin(cone) + 0.0 * theta,
+                ]
+            )
+            omega = rates[0] * shaft
+            omega[2] = omega[2] + rate
+            momentum = np.tensordot(tensors[i], omega, axes=1)
+            moment = np.cross(omega, momentum, axis=0)
+            on_rotor = on_rotor + (shaft * moment).sum(axis=0)
+            on_pitches.append(moment[2])
+        return on_rotor, on_pitches
 
     return _with_moments(moments)
 
@@ -387,15 +460,9 @@ _OTHER_EQUATIONS = {
     "moments of the pitch bearings with reactions on the rotor": _with_moments(
         _reaction_of_bearings
     ),
-    "without gravity in the equations of the pitches": _with_moments(_gravity_on_pitches),
-    "weight of the blades on the pitch axes": _with_moments(_weight_off_axis),
-    "without the gyroscopic moments ω x J ω of the blades": _with_moments(_gyroscopic_moments),
-    "weight of the blades on the pitch axes in the rotor's equation alone": _with_moments(
-        _rotor_weight_off_axis
-    ),
     "dampers of the bearings with reactions on the rotor": _with_moments(_reaction_of_dampers),
-    "opposite sign of the dampers of the bearings": _with_moments(_opposite_dampers),
     "dampers of the bearings quadratic in the rate": _with_moments(_quadratic_dampers),
+    "damper of the shaft quadratic in the rate": _with_moments(_quadratic_shaft_damper),
     "springs by the sine of the deflection": _with_moments(_sine_springs),
     "without the coupling of rotor and pitches in the mass matrix": _with_coupling(0.0),
     "opposite sign of the coupling of rotor and pitches in the mass matrix": _with_coupling(-1.0),
@@ -448,8 +515,7 @@ def other_scenes(scene: Scene) -> Iterator[tuple[str, Scene]]:
         yield text, replace(scene, shaft_tilt=0.0, blades=upright)
     yield from _exchanged_bearings(scene)
     for (field, text), (amount, factor) in itertools.product(_FORGOTTEN.items(), _FACTORS.items()):
-        # A scene has no negative stiffness, damping or inertia, and no motion lasts with it.
-        if factor >= 0.0 or field in ("rotor_torque", "pitch_torque"):
+        if factor >= 0.0 or field in _SIGNED:
             yield f"{amount} {text}", _scaled_at(scene, [(field,)], factor - 1.0)
     for field, (name, units) in _UNITS.items():
         for factor, text in units:
@@ -460,15 +526,6 @@ def other_scenes(scene: Scene) -> Iterator[tuple[str, Scene]]:
     if any(scene.bearing_stiffness[1:]):
         springs = (scene.bearing_stiffness[0], *(0.0 for _ in scene.bearing_stiffness[1:]))
         yield "a spring at blade 1 alone", replace(scene, bearing_stiffness=springs)
-    if any(scene.bearing_stiffness):
-        unloaded = replace(scene, bearing_rest=())
-        yield "rest angles of the springs ignored: taken as 0", unloaded
-        for text, factor in (
-            ("rad taken as degrees", math.pi / 180.0),
-            ("degrees taken as rad", 180.0 / math.pi),
-        ):
-            changed = _scaled_at(scene, [("bearing_rest",)], factor - 1.0)
-            yield f"rest angles of the springs in {text}", changed
     count = len(scene.blades)
     if count > 2:  # of two blades this is twice the hub's inertia, which is yielded above
         hubs = replace(scene, hub_inertia=count * scene.hub_inertia)
@@ -482,25 +539,34 @@ def other_scenes(scene: Scene) -> Iterator[tuple[str, Scene]]:
         yield f"pitch angles from another zero: {degrees} degrees where they are 0", turned
 
 
-def by_rows(scene: Scene, times: Sequence[float]) -> Iterator[Hypothesis[RotorModel]]:
+def by_rows(
+    scene: Scene, times: Array, intervals: NDArray[np.int64]
+) -> Iterator[Hypothesis[RotorModel]]:
     """Yield methods with steps that divide rows, and loads that are held or late by rows.
 
     Parameters
     ----------
     scene : the rotor as it is.
-    times : s, of all rows.
+    times : (n,) s, of all rows.
+    intervals : (k,) numbers of the intervals in which loads have to be held.
     """
-    step = (times[-1] - times[0]) / (len(times) - 1)
+    step = float(times[-1] - times[0]) / (len(times) - 1)
     for text, method, steps in coarse_methods(step):
         yield Hypothesis(text, RotorModel(scene, method=method, steps=steps))
     if scene.has_constant_loads:
         return
-    held = with_held_loads(scene, times)
-    yield from _with_loads_of(scene, held, "held from each row to the next")
-    for rows in _CYCLES:
+    # Of a single kind of loads this is among the other scenes.
+    held = _with_tables(scene, _held_from_row_to_row)
+    how = "held from row to row of their tables"
+    yield from itertools.islice(_with_loads_of(scene, held, how), 1, None)
+    for rows in (1, *_CYCLES):
         if 2 * rows < len(times):
-            held = with_held_loads(scene, [*times[:-1:rows], times[-1]])
+            first = intervals // rows * rows
+            ends = np.minimum(first + rows, len(times) - 1)
+            held = with_held_loads(scene, times[np.union1d(first, ends)].tolist())
             how = f"held over a cycle of {rows} rows, {rows * step:.6g} s"
+            if rows == 1:
+                how = "held from each row to the next"
             yield from _with_loads_of(scene, held, how)
     for rows in _DELAYS:
         if rows * step < scene.duration:
@@ -538,21 +604,21 @@ def _with_late_loads(scene: Scene, delay: float) -> Scene:
     def late(table: LoadTable) -> LoadTable:
         return tuple((time + delay, value) for time, value in table)
 
-    return replace(
-        scene,
-        rotor_torque=late(scene.rotor_torque),
-        pitch_torque=tuple(late(table) for table in scene.pitch_torque),
-        bearing_rest=tuple(late(table) for table in scene.bearing_rest),
-    )
+    return _with_tables(scene, late)
 
 
 def with_held_loads(scene: Scene, times: Sequence[float]) -> Scene:
     """Return a scene whose loads are constant from each of some times, s, to the next."""
+    return _with_tables(scene, functools.partial(_held, times))
+
+
+def _with_tables(scene: Scene, change: Callable[[LoadTable], LoadTable]) -> Scene:
+    """Return a scene with a change in the table of each load."""
     return replace(
         scene,
-        rotor_torque=_held(scene.rotor_torque, times),
-        pitch_torque=tuple(_held(table, times) for table in scene.pitch_torque),
-        bearing_rest=tuple(_held(table, times) for table in scene.bearing_rest),
+        rotor_torque=change(scene.rotor_torque),
+        pitch_torque=tuple(change(table) for table in scene.pitch_torque),
+        bearing_rest=tuple(change(table) for table in scene.bearing_rest),
     )
 
 
@@ -582,13 +648,21 @@ def _with_damped_error(scene: Scene) -> Scene:
     return replace(scene, pitch_torque=tuple(damped))
 
 
-def _held(table: LoadTable, times: Sequence[float]) -> LoadTable:
+def _held(times: Sequence[float], table: LoadTable) -> LoadTable:
     """Return a load that keeps its value at each of some times, s, until the next."""
     held: list[tuple[float, float]] = []
     for start, end in itertools.pairwise(times):
         value = value_at(table, start)
         held += [(start, value), (end, value)]
     return tuple(held) if table else ()
+
+
+def _held_from_row_to_row(table: LoadTable) -> LoadTable:
+    """Return a load that keeps the value of each row of its table until the next row."""
+    held = list(table[:1])
+    for (_, before), (time, value) in itertools.pairwise(table):
+        held += [(time, before), (time, value)]
+    return tuple(held)
 
 
 def _single_blades(scene: Scene) -> range:
@@ -603,31 +677,57 @@ def _other_blades(scene: Scene) -> Iterator[tuple[str, Scene]]:
     ----------
     scene : the rotor as it is.
     """
-    changes: Mapping[str, Callable[[Blade], Blade]] = {
-        "products of inertia about the centre of mass ignored": _without_products,
-        "blade mass on the pitch axis": _with_mass_on_axis,
-        "blades without inertia, as point masses": _without_inertia,
-        "products of inertia with opposite sign": _with_opposite_products,
-        "products of inertia about the root with opposite sign": _with_opposite_root_products,
-        "cone of the blades with opposite sign": lambda blade: replace(blade, cone=-blade.cone),
-        "moments of inertia about x and y exchanged": _with_exchanged_moments,
-        "centre of mass at half its distance from the apex": _with_half_distance,
-        "hub.radius added to the distance of the centre of mass": functools.partial(
-            _with_distance, scene.hub_radius
-        ),
-        "hub.radius subtracted from the distance of the centre of mass": functools.partial(
-            _with_distance, -scene.hub_radius
-        ),
-        "without the cone of the blades": lambda blade: replace(blade, cone=0.0),
-        "tip used as centre of mass": lambda blade: replace(blade, centre_of_mass=blade.tip),
-        "inertia about the root used as inertia about the centre of mass": _with_steiner,
-        "inertia about the centre of mass used as inertia about the root: "
-        "without Steiner's share": _without_steiner,
-    }
     blades = scene.blades
-    for text, change in changes.items():
-        yield text, replace(scene, blades=tuple(change(blade) for blade in blades))
-    yield "numbers of blade 1 at all blades", replace(scene, blades=(blades[0],) * len(blades))
+    radius = scene.hub_radius
+    cones = "cone of the blades"
+    others: dict[str, list[Blade]] = {
+        f"{cones} with opposite sign": [replace(blade, cone=-blade.cone) for blade in blades],
+        f"without the {cones}": [replace(blade, cone=0.0) for blade in blades],
+        "masses of the blades in lb taken as kg": [
+            replace(blade, mass=blade.mass / _POUND) for blade in blades
+        ],
+        "masses of the blades in kg taken as lb": [
+            replace(blade, mass=blade.mass * _POUND) for blade in blades
+        ],
+        "tip used as centre of mass": [
+            replace(blade, centre_of_mass=blade.tip) for blade in blades
+        ],
+        "weight of the blades on the pitch axes": [_with_weight_on_axis(blade) for blade in blades],
+        "inertia moved by the distance from the root, hub.radius less": [
+            _with_inertia(blade, np.add(blade.inertia, _steiner(blade, -radius) - _steiner(blade)))
+            for blade in blades
+        ],
+    }
+    centres: Mapping[str, Callable[[float, float, float], tuple[float, float, float]]] = {
+        "blade mass on the pitch axis": lambda _x, _y, z: (0.0, 0.0, z),
+        "centre of mass at half its distance from the apex": lambda x, y, z: (x, y, 0.5 * z),
+        "x and y of the centres of mass exchanged": lambda x, y, z: (y, x, z),
+        "hub.radius added to the distance of the centre of mass": lambda x, y, z: (
+            (x, y, z + radius)
+        ),
+        "hub.radius subtracted from the distance of the centre of mass": lambda x, y, z: (
+            (x, y, z - radius)
+        ),
+    }
+    for text, moved in centres.items():
+        others[text] = [
+            replace(blade, centre_of_mass=moved(*blade.centre_of_mass)) for blade in blades
+        ]
+    for text, inertia in _INERTIAS.items():
+        others[text] = [
+            _with_inertia(blade, inertia(np.array(blade.inertia), _steiner(blade)))
+            for blade in blades
+        ]
+    for text, changed in others.items():
+        yield text, replace(scene, blades=tuple(changed))
+    for i in _single_blades(scene):
+        yield (
+            f"numbers of blade {i + 1} at all blades",
+            replace(scene, blades=(blades[i],) * len(blades)),
+        )
+        for j in _single_blades(scene) if len(blades) > 2 else ():
+            copied = (*blades[:j], blades[i], *blades[j + 1 :])
+            yield f"numbers of blade {i + 1} at blade {j + 1}, too", replace(scene, blades=copied)
     for i in _single_blades(scene):
         for j in range(i):
             text = f"numbers of blades {i + 1} and {j + 1} exchanged"
@@ -677,70 +777,51 @@ def _exchanged_bearings(scene: Scene) -> Iterator[tuple[str, Scene]]:
         yield "stiffness and damping of bearing 1 at all blades", replace(scene, **first)
 
 
-def _with_mass_on_axis(blade: Blade) -> Blade:
-    """Return a blade whose centre of mass is on its pitch axis."""
-    return replace(blade, centre_of_mass=(0.0, 0.0, blade.centre_of_mass[2]))
+# Wrong elements xx yy zz xy xz yz of a blade's inertia about its centre of mass, from the right ones
+# and Steiner's share of that about the apex.
+_PRODUCTS = np.array([0.0, 0.0, 0.0, 1.0, 1.0, 1.0])
+_INERTIAS: Mapping[str, Callable[[Array, Array], Array]] = {
+    "products of inertia about the centre of mass ignored": lambda own, _: own * (1.0 - _PRODUCTS),
+    "blades without inertia, as point masses": lambda own, _: 0.0 * own,
+    "products of inertia with opposite sign": lambda own, _: own * (1.0 - 2.0 * _PRODUCTS),
+    # Steiner's share is added again when the tensor is moved to the apex.
+    "products of inertia about the root with opposite sign": lambda own, share: (
+        own - 2.0 * _PRODUCTS * (own + share)
+    ),
+    "moments of inertia about x and y exchanged": lambda own, _: own[[1, 0, 2, 3, 4, 5]],
+    "inertia about the root used as inertia about the centre of mass": lambda own, share: (
+        own + share
+    ),
+    "inertia about the centre of mass used as inertia about the root: without Steiner's share": (
+        lambda own, share: own - share
+    ),
+}
 
 
-def _with_distance(change: float, blade: Blade) -> Blade:
-    """Return a blade whose centre of mass is farther along its pitch axis by a change in m."""
+def _steiner(blade: Blade, farther: float = 0.0) -> Array:
+    """Return Steiner's share of a blade's inertia about the apex: xx yy zz xy xz yz, kg m².
+
+    Parameters
+    ----------
+    blade : with its mass and centre of mass.
+    farther : m, by which this is farther from the apex.
+    """
     x, y, z = blade.centre_of_mass
-    return replace(blade, centre_of_mass=(x, y, z + change))
+    z += farther
+    shares = [y * y + z * z, x * x + z * z, x * x + y * y, -x * y, -x * z, -y * z]
+    return blade.mass * np.array(shares)
 
 
-def _with_half_distance(blade: Blade) -> Blade:
-    """Return a blade whose centre of mass is at half its distance along the pitch axis."""
-    return _with_distance(-0.5 * blade.centre_of_mass[2], blade)
+def _with_inertia(blade: Blade, elements: Array) -> Blade:
+    """Return a blade with other elements xx yy zz xy xz yz of its inertia, kg m²."""
+    xx, yy, zz, xy, xz, yz = elements.tolist()
+    return replace(blade, inertia=(xx, yy, zz, xy, xz, yz))
 
 
-def _with_exchanged_moments(blade: Blade) -> Blade:
-    """Return a blade with the moments of inertia about its x and y axes exchanged."""
-    xx, yy, *others = blade.inertia
-    return replace(blade, inertia=_inertia([yy, xx, *others]))
-
-
-def _without_inertia(blade: Blade) -> Blade:
-    """Return a blade without inertia about its centre of mass."""
-    return replace(blade, inertia=_inertia([0.0] * 6))
-
-
-def _without_products(blade: Blade) -> Blade:
-    """Return a blade without products of inertia about its centre of mass."""
-    return replace(blade, inertia=_inertia([*blade.inertia[:3], 0.0, 0.0, 0.0]))
-
-
-def _with_opposite_products(blade: Blade) -> Blade:
-    """Return a blade whose products of inertia about its centre of mass have the other sign."""
-    products = [-product for product in blade.inertia[3:]]
-    return replace(blade, inertia=_inertia([*blade.inertia[:3], *products]))
-
-
-def _with_opposite_root_products(blade: Blade) -> Blade:
-    """Return a blade whose products of inertia about its root have the other sign."""
-    # The products about the root contain those of the mass at its centre, which are added again
-    # when the tensor is moved to the root: so twice the whole is subtracted from the blade's own.
-    inertia = [*blade.inertia[:3]]
-    for own, about_root in zip(blade.inertia[3:], blade.inertia_about_apex()[3:], strict=True):
-        inertia.append(own - 2.0 * about_root)
-    return replace(blade, inertia=_inertia(inertia))
-
-
-def _with_steiner(blade: Blade) -> Blade:
-    """Return a blade as if its inertia were about the centre of mass: Steiner's share twice."""
-    return replace(blade, inertia=_inertia(blade.inertia_about_apex()))
-
-
-def _without_steiner(blade: Blade) -> Blade:
-    """Return a blade whose inertia about the root is what it has about the centre of mass."""
-    inertia = []
-    for own, about_root in zip(blade.inertia, blade.inertia_about_apex(), strict=True):
-        inertia.append(2.0 * own - about_root)
-    return replace(blade, inertia=_inertia(inertia))
-
-
-def _inertia(values: Sequence[float]) -> tuple[float, float, float, float, float, float]:
-    xx, yy, zz, xy, xz, yz = values
-    return xx, yy, zz, xy, xz, yz
+def _with_weight_on_axis(blade: Blade) -> Blade:
+    """Return a blade with its weight on the pitch axis, and the same inertia about the apex."""
+    moved = replace(blade, centre_of_mass=(0.0, 0.0, blade.centre_of_mass[2]))
+    return _with_inertia(moved, np.array(blade.inertia) + _steiner(blade) - _steiner(moved))
 
 
 def other_azimuths(scene: Scene) -> Iterator[tuple[str, tuple[float, ...]]]:
@@ -762,6 +843,11 @@ def other_azimuths(scene: Scene) -> Iterator[tuple[str, tuple[float, ...]]]:
             yield "blades at multiples of 120 degrees", of_three
     if count > 2:
         yield "blades numbered in the opposite sense", (right[0], *right[:0:-1])
+    # Of three blades such an exchange is the opposite sense.
+    for i, j in itertools.combinations(range(1, count if 3 < count <= _MAX_BLADES else 0), 2):
+        exchanged = _exchanged(right, i, j)
+        if exchanged[1:] != right[:0:-1]:
+            yield f"azimuths of blades {i + 1} and {j + 1} exchanged", exchanged
     for i in range(count if 2 < count <= _MAX_BLADES else 0):
         for other in ((i + 1) % count, (i - 1) % count):
             place = f"{360 * other / count:g} degrees in place of {360 * i / count:g}"
@@ -913,8 +999,7 @@ def _pitch_turned(scene: Scene, chosen: Sequence[int], angle: float) -> Scene:
         inertia = turn @ blades[i].inertia_tensor @ turn.T
         x, y, z = (turn @ blades[i].centre_of_mass).tolist()
         places = [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]  # xx yy zz xy xz yz
-        elements = _inertia(inertia[places].tolist())
-        blades[i] = replace(blades[i], centre_of_mass=(x, y, z), inertia=elements)
+        blades[i] = _with_inertia(replace(blades[i], centre_of_mass=(x, y, z)), inertia[places])
     return replace(scene, blades=tuple(blades))
 
 

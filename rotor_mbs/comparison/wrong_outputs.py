@@ -6,7 +6,6 @@ named if it leaves at most a thousandth of the difference; for loads and tips on
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
@@ -15,15 +14,12 @@ from numpy.typing import NDArray
 
 from rotor_mbs.analysis import kinematics
 from rotor_mbs.analysis.judgement import defects_of
-from rotor_mbs.comparison.loads import (
-    distinct_frames,
-    is_at_jump,
-    loads_by_frame,
-    shaft_direction,
-)
+from rotor_mbs.comparison.channels import channels
+from rotor_mbs.comparison.data import ForeignData
+from rotor_mbs.comparison.loads import compare_loads, shaft_direction
 from rotor_mbs.comparison.other_rotors import other_azimuths, other_scenes
+from rotor_mbs.comparison.verdict import DEFAULT_TOLERANCE
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.scenario.time_table import ROTOR_TORQUE, values_before
 from rotor_mbs.solution.defects import Defects
 from rotor_mbs.solution.quantities import LOADS
 from rotor_mbs.solution.trajectory import Array, Trajectory
@@ -337,110 +333,28 @@ def _without_springs(scene: Scene) -> Scene:
 
 
 def wrong_loads(scene: Scene, run: Trajectory) -> str:
-    """Return the mistakes in the loads of a run.
-
-    Rows at which a prescribed load jumps are left out, as `compare` does.
+    """Return the mistakes in the loads of a run, in words, as `compare` finds them; "" if unknown.
 
     Parameters
     ----------
     scene : the rotor.
     run : samples of the run; of the loads those that it has are examined.
-
-    Returns
-    -------
-    str
-        For each wrong load that exactly one mistake explains, its name and the mistake; "" if
-        there are none.
     """
-    rows = ~is_at_jump(scene, run.time)
-    time, angles, rates = run.time[rows], run.angles[rows], run.rates[rows]
-    frames: dict[str, Mapping[str, Array]] = {}
-    for frame, matrix in loads_by_frame(scene, time, angles, rates).items():
-        frames[frame] = _by_load(scene, matrix)
-    others: dict[str, Mapping[str, Array]] = {}
-    for text, other in _leaning_otherwise(scene):
-        others[text] = _by_load(scene, loads_by_frame(other, time, angles, rates)[""])
-    if scene.hub_mass:
-        bare = replace(scene, hub_mass=0.0)
-        matrix = loads_by_frame(bare, time, angles, rates)[""]
-        others["without the hub's weight"] = _by_load(scene, matrix)
-    torque = values_before(scene.load_segments, time)[ROTOR_TORQUE]
-    texts = []
-    for load in LOADS:
-        stored = run.get(load.name)
-        if stored is None:
-            continue
-        trials = dict(_other_loads(scene, load.name, frames, torque))
-        trials |= {text: arrays[load.name] for text, arrays in others.items()}
-        named = _explaining(stored[rows], frames[""][load.name], trials)
-        if len(named) == 1:
-            texts.append(f"{load.name.replace('_', ' ')}: {named[0]}")
-    return "; ".join(texts)
-
-
-def _other_loads(
-    scene: Scene, name: str, frames: Mapping[str, Mapping[str, Array]], torque: Array
-) -> Iterator[tuple[str, Array]]:
-    """Yield wrong values of a load, each with its mistake in words before it.
-
-    Parameters
-    ----------
-    scene : the rotor.
-    name : of the load, as in `LOADS`.
-    frames : by frame, "" for each load's own, the right loads by name.
-    torque : (n,) N m, the prescribed torque on the rotor.
-    """
-    own = frames[""][name]
-    yield "sign reversed (action in place of reaction)", -own
-    yield "kN taken as N", 1e-3 * own
-    yield "N taken as kN", 1e3 * own
-    for frame in distinct_frames(scene)[1:]:
-        yield f"in the {frame} frame", frames[frame][name]
-    if name.startswith(("blade", "pitch")):
-        for order, place in _exchanges(len(scene.blades)):
-            yield place, own[:, order]
-    if name == "blade_root_moment":
-        points = {
-            "centre of mass": [blade.centre_of_mass for blade in scene.blades],
-            "tip": [blade.tip for blade in scene.blades],
-        }
-        if scene.hub_radius:
-            points["apex"] = [(0.0, 0.0, 0.0)] * len(scene.blades)
-        for point, places in points.items():
-            arms = np.array(places) - [0.0, 0.0, scene.hub_radius]
-            moved = own - np.cross(arms, frames[""]["blade_root_force"])
-            yield f"about the {point} in place of the root", moved
-    if name == "shaft_moment":
-        along_shaft = torque[:, None] * shaft_direction(scene, "")
-        yield "with the torque on the rotor in it", own + along_shaft
-
-
-def _by_load(scene: Scene, matrix: Array) -> dict[str, Array]:
-    """Return arrays by the loads' names from the columns of `loads_by_frame`.
-
-    Parameters
-    ----------
-    scene : the rotor, with its number of blades.
-    matrix : (n, components) N or N m in one frame.
-
-    Returns
-    -------
-    dict of ndarray
-        (n, ...) N or N m, with a dimension for the blades and one for the axes where a load has
-        them.
-    """
-    arrays = {}
-    first = 0
-    for load in LOADS:
-        shape = []
-        if "blade" in load.dimensions:
-            shape.append(len(scene.blades))
-        if "axis" in load.dimensions:
-            shape.append(3)
-        count = math.prod(shape)
-        arrays[load.name] = matrix[:, first : first + count].reshape(len(matrix), *shape)
-        first += count
-    return arrays
+    defects = defects_of(scene, run)
+    by_load = {load.name: run.get(load.name) for load in LOADS}
+    chosen, columns = [], []
+    known = [channel for channel in channels(scene) if channel.is_load]
+    for load, values in by_load.items():
+        of_load = [channel for channel in known if channel.key.startswith(load)]
+        if values is not None:
+            chosen += of_load
+            columns.append(values.reshape(len(run.time), -1))
+    if defects is None or not chosen:
+        return ""
+    values = np.hstack(columns)
+    rounding = 2.0**-53 * np.abs(values)
+    data = ForeignData("the run", run.time, values, tuple(chosen), rounding, 0.0 * run.time)
+    return "; ".join(compare_loads(scene, data, defects, DEFAULT_TOLERANCE).likely)
 
 
 # All of them

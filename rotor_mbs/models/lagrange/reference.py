@@ -343,5 +343,8 @@ REDUCED_EQUATIONS: Mapping[str, Accelerations] = {
     "centrifugal terms (square of the rotor rate)": combined_equations(
         (1.0, 1, 1), (-0.5, 1, 0), (-0.5, -1, 0), (1.0, 0, 0)
     ),
+    "squares of the pitch rates": combined_equations(
+        (1.0, 1, 1), (-0.5, 0, 1), (-0.5, 0, -1), (1.0, 0, 0)
+    ),
     "terms with products of rates": combined_equations((0.5, 1, 1), (-0.5, -1, -1), (1.0, 0, 0)),
 }

@@ -242,7 +242,8 @@ class LoadParts:
     rates : factor of the rates, on which the other inertia forces depend.
     hub : factor of the hub's inertia, in the shaft's moment.
     inertia : factor of the blades' inertia about their centres of mass, in roots and shaft.
-    dampers : factor of the dampers in the moments of the pitch actuators.
+    dampers, torques : factors of the dampers and the prescribed torques in the moments of the pitch
+        actuators.
     """
 
     weight: float = 1.0
@@ -251,6 +252,7 @@ class LoadParts:
     hub: float = 1.0
     inertia: float = 1.0
     dampers: float = 1.0
+    torques: float = 1.0
 
 
 def sampled_loads(
@@ -448,9 +450,9 @@ def _loads(
     actuators = np.zeros_like(angles[:, 1:])
     for column in moving[1:]:
         stiffness, damping = scene.bearings[column - 1]
-        if parts is not None:
-            damping *= parts.dampers
         torque, rest = applied[torque_place(column)], applied[rest_place(column)]
+        if parts is not None:
+            damping, torque = parts.dampers * damping, parts.torques * torque
         actuators[:, column - 1] = (
             torque - stiffness * (angles[:, column] - rest) - damping * rates[:, column]
         )
