@@ -338,10 +338,10 @@ class ColumnReadings:
             yield self._inverse(j, f"{HELD} for {period} rows", held)
 
     def _filtered(self, j: int) -> Iterator[Reading]:
-        """Yield the reading of a column behind a filter of first order, from the first row on.
+        """Yield the reading of a column behind a filter of first order.
 
         Such a filter moves a number by a share of the distance from the row before to the right
-        one: the share follows by least squares, and the right numbers from the data.
+        one: the share follows by least squares, and all right numbers but the first from the data.
 
         Parameters
         ----------
@@ -356,7 +356,7 @@ class ColumnReadings:
         share = float(np.diff(here) @ distances) / (float(distances @ distances) or 1.0)
         if not _MIN_SHARE < share < 1.0 - _MIN_SHARE:
             return
-        right, growing = values.copy(), rounding.copy()
+        right, growing = np.full(len(values), np.nan), rounding.copy()
         right[1:] = values[:-1] + np.diff(values) / share
         growing[1:] = (2.0 / share - 1.0) * np.maximum(rounding[1:], rounding[:-1])
         # The rounding grows: where it is as large as the difference, it would explain anything.
@@ -461,10 +461,10 @@ class ColumnReadings:
 
 
 def held_rows(values: Array) -> int:
-    """Return for how many rows each of (n, columns) numbers is held, 1 where it is not."""
+    """Return for how many rows each of (n, columns) numbers is held, 0 if there is one alone."""
     changes = np.flatnonzero(np.diff(values, axis=0).any(axis=1)) + 1
     if not len(changes):
-        return 1
+        return 0
     # The first number may be held for less: those of the nearest of every few rows are.
     return int(np.gcd.reduce(np.diff(changes))) if len(changes) > 1 else int(changes[0])
 

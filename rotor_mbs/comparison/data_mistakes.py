@@ -466,7 +466,9 @@ def _may_explain(search: TrajectorySearch, inside: ForeignData, *, with_factor: 
         window = inside.rows(slice(first, first + _WINDOW_ROWS))
         states, carried = search.states_at(window.time), search.carried(window.time)
         readings = _readings(wider, window, states, carried, with_factor=with_factor)
-        if all(readings.best(j) is not None for j in range(len(window.channels))):
+        places = range(len(window.channels))
+        # Of a column that is held or limited, a window may show too little.
+        if all(held_rows(window.values[:, [j]]) != 1 or readings.best(j) for j in places):
             continue
         if _nearest_channels(window, states, carried)[1] > wider.allowed:
             return False

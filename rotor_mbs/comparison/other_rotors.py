@@ -777,8 +777,8 @@ def _exchanged_bearings(scene: Scene) -> Iterator[tuple[str, Scene]]:
         yield "stiffness and damping of bearing 1 at all blades", replace(scene, **first)
 
 
-# Wrong elements xx yy zz xy xz yz of a blade's inertia about its centre of mass, from the right ones
-# and Steiner's share of that about the apex.
+# Wrong elements xx yy zz xy xz yz of the inertia about the centre of mass, from the right ones
+# and Steiner's share of the inertia about the apex.
 _PRODUCTS = np.array([0.0, 0.0, 0.0, 1.0, 1.0, 1.0])
 _INERTIAS: Mapping[str, Callable[[Array, Array], Array]] = {
     "products of inertia about the centre of mass ignored": lambda own, _: own * (1.0 - _PRODUCTS),

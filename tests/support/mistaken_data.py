@@ -1819,7 +1819,8 @@ NAMED: dict[str, str] = {
     "e46": "springs by the sine",
     "e47": "a spring at blade 1 alone",
     "e48": "^without the coupling of rotor and pitches",
-    "e49": "on the pitch axes in the rotor's equation alone",
+    # Of three equal blades the weights on the pitch axes cancel in the rotor's equation.
+    "e49": "on the pitch axes in the rotor's equation alone|^without gravity in the rotor's equation",
     "e51": "load that is wrong or missing from t = .* to 1 s: .* on the rotor",
     "e52": "torque of the rotor held over a cycle of 5 rows",
     "e53": "^twice the centrifugal",
