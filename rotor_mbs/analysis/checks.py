@@ -166,13 +166,9 @@ def _of_run(
             scene, run.method, solution.trajectory, judgement.metrics, judgement.defects
         )
         yield from run_checks(samples, bounds, is_corrected=is_corrected(run.method))
-        own_growth = judgement.defects.error_growth if judgement.defects is not None else None
-        if (
-            run.method == REFERENCE
-            and own_growth is not None
-            and "error_growth" in solution.trajectory.quantities
-        ):
-            growth = solution.trajectory.error_growth
+        growth = solution.trajectory.get("error_growth")
+        if run.method == REFERENCE and growth is not None and judgement.defects is not None:
+            own_growth = judgement.defects.error_growth
             known = np.isfinite(own_growth) & (own_growth < HORIZON_GROWTH)
             off = float(np.abs(np.log(growth[known] / own_growth[known])).max(initial=0.0))
             hint = "the stored horizon is not that computed from the samples"

@@ -457,6 +457,9 @@ def test_what_is_worked_on_block_by_block_is_as_of_all_at_once(
         np.testing.assert_allclose(
             getattr(parts, name), getattr(whole, name), rtol=1e-9, err_msg=name
         )
+    for limit in np.geomspace(2.0, 1e9, 30):
+        beyond = np.flatnonzero(whole.error_growth >= limit)
+        assert parts.horizon_samples(limit) == (beyond[0] if len(beyond) else len(whole.time))
     np.testing.assert_allclose(parts.predicted, whole.predicted, rtol=1e-9, atol=1e-15)
     np.testing.assert_allclose(parts.over_rows(7), whole.over_rows(7), rtol=1e-9)
     for defects in (parts, whole):
