@@ -1804,7 +1804,7 @@ NAMED: dict[str, str] = {
     "e31": "^tilt of the shaft with opposite sign",
     "e32": "^without the cone",
     "e33": "^cone of the blades with opposite sign",
-    "e34": r"shaft.tilt off by \+0.09 rad .*blade.cone off by \+0.06 rad",
+    "e34": "^without the tilt of the shaft and the cone of the blades",
     "e35": "^without the damper of the shaft",
     "e36": "^without the dampers of the bearings",
     "e37": "^opposite sign of the dampers",
