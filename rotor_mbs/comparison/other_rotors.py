@@ -264,25 +264,23 @@ def _with_moments(moments: Callable[..., tuple[Any, Sequence[Any]]]) -> Accelera
     return equations
 
 
-def _reaction_of_torques(_angles: Any, _rates: Any, form: Any, loads: Any) -> Any:
-    """Return the pitch torques' reactions as if the pitch axes were along the shaft."""
-    return -sum(loads.pitches), [0.0] * len(form.blades)
+def _with_reactions(torques: float, springs: float, dampers: float) -> Accelerations:
+    """Return equations in which moments on the pitches react on the rotor.
 
+    Parameters
+    ----------
+    torques, springs, dampers : 1 for those whose reactions are as if the pitch axes were along the
+        shaft, 0 for the others.
+    """
 
-def _reaction_of_bearings(angles: Any, rates: Any, form: Any, loads: Any) -> Any:
-    """Return the reactions of pitch torques, springs and dampers as if along the shaft."""
-    total: Any = 0.0
-    for blade, theta, rate, torque, rest in closed_form.pitches(form, angles, rates, loads):
-        total = total + torque + blade.stiffness * (rest - theta) - blade.damping * rate
-    return -total, [0.0] * len(form.blades)
+    def moments(angles: Any, rates: Any, form: Any, loads: Any) -> Any:
+        total: Any = 0.0
+        for blade, theta, rate, torque, rest in closed_form.pitches(form, angles, rates, loads):
+            total = total + torques * torque - dampers * blade.damping * rate
+            total = total + springs * blade.stiffness * (rest - theta)
+        return -total, [0.0] * len(form.blades)
 
-
-def _reaction_of_dampers(_angles: Any, rates: Any, form: Any, _loads: Any) -> Any:
-    """Return the reactions of the bearings' dampers as if along the shaft."""
-    total: Any = 0.0
-    for blade, rate in zip(form.blades, rates[1:], strict=True):
-        total = total + blade.damping * rate
-    return total, [0.0] * len(form.blades)
+    return _with_moments(moments)
 
 
 def _quadratic_dampers(_angles: Any, rates: Any, form: Any, _loads: Any) -> Any:
@@ -456,11 +454,9 @@ def _without_gyroscopic_moments(scene: Scene, tensors: Sequence[Array]) -> Accel
 
 # Equations with one mistake, of methods by Lagrange's equations or by Newton's and Euler's.
 _OTHER_EQUATIONS = {
-    "pitch torques with reactions on the rotor": _with_moments(_reaction_of_torques),
-    "moments of the pitch bearings with reactions on the rotor": _with_moments(
-        _reaction_of_bearings
-    ),
-    "dampers of the bearings with reactions on the rotor": _with_moments(_reaction_of_dampers),
+    "pitch torques with reactions on the rotor": _with_reactions(1.0, 0.0, 0.0),
+    "moments of the pitch bearings with reactions on the rotor": _with_reactions(1.0, 1.0, 1.0),
+    "dampers of the bearings with reactions on the rotor": _with_reactions(0.0, 0.0, 1.0),
     "dampers of the bearings quadratic in the rate": _with_moments(_quadratic_dampers),
     "damper of the shaft quadratic in the rate": _with_moments(_quadratic_shaft_damper),
     "springs by the sine of the deflection": _with_moments(_sine_springs),
@@ -686,12 +682,6 @@ def _other_blades(scene: Scene) -> Iterator[tuple[str, Scene]]:
         "masses of the blades in lb taken as kg": [
             replace(blade, mass=blade.mass / _POUND) for blade in blades
         ],
-        "masses of the blades in kg taken as lb": [
-            replace(blade, mass=blade.mass * _POUND) for blade in blades
-        ],
-        "tip used as centre of mass": [
-            replace(blade, centre_of_mass=blade.tip) for blade in blades
-        ],
         "weight of the blades on the pitch axes": [_with_weight_on_axis(blade) for blade in blades],
         "inertia moved by the distance from the root, hub.radius less": [
             _with_inertia(blade, np.add(blade.inertia, _steiner(blade, -radius) - _steiner(blade)))
@@ -704,9 +694,6 @@ def _other_blades(scene: Scene) -> Iterator[tuple[str, Scene]]:
         "x and y of the centres of mass exchanged": lambda x, y, z: (y, x, z),
         "hub.radius added to the distance of the centre of mass": lambda x, y, z: (
             (x, y, z + radius)
-        ),
-        "hub.radius subtracted from the distance of the centre of mass": lambda x, y, z: (
-            (x, y, z - radius)
         ),
     }
     for text, moved in centres.items():
