@@ -1,12 +1,13 @@
 """The mutation run: one change to the source at a time, and `rotor-mbs check` or a test must
 notice.
 
-    python tests/support/mutation.py [PATTERN] [--every N] [--jobs N] [--log FILE] [--limit S]
+    python tests/support/mutation.py [PATTERN] [--every N] [--jobs N] [--log FILE]
 
 Each mutant has a process of its own, forked from one that has loaded the engines. There the package
 is imported with the changed module, a few scenes are run and judged as `check` does it, and where
-no check fails, the tests that belong to the module are run. A mutant that raises or does not end is
-noticed, too: `check` fails for a run that failed.
+no check fails, the tests that belong to the module are run: what noticed the last mutants of the
+function first, then those that take least. A mutant that raises or does not end is noticed, too:
+`check` fails for a run that failed.
 """
 
 from __future__ import annotations
@@ -17,11 +18,13 @@ import copy
 import importlib
 import importlib.util
 import io
+import math
 import os
 import re
+import resource
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import redirect_stderr, redirect_stdout, suppress
 from functools import partial
@@ -34,7 +37,23 @@ from typing import Any, NamedTuple
 import pytest
 
 ROOT = Path(__file__).parents[2]
-TIME_LIMIT_S = 120.0
+# The processor time of a run or a test: five times what the longest takes without any change. A
+# process that waits uses none.
+LIMIT_S = 20.0
+LIMIT_OF_WAITING_S = 900.0
+# Loaded once, for all forks.
+PACKAGES = (
+    "exudyn",
+    "mujoco",
+    "heyoka",
+    "scipy.integrate",
+    "scipy.special",
+    "h5py",
+    "hypothesis.strategies",
+    "asyncio",
+    "filelock",
+    "unittest.mock",
+)
 
 
 class Target(NamedTuple):
@@ -597,54 +616,102 @@ class _Changed(SourceFileLoader):
         return compile(self.tree, self.path, "exec")
 
 
-def noticed_by(mutant: Mutant) -> str:
-    """Which check or test failed first, or what was raised; "" where none did. For a process of its
-    own."""
+# A run as a scene and a method, or a test's name.
+Detector = tuple[str, str] | str
+
+
+class Answer(NamedTuple):
+    """What a process found.
+
+    failure    which check or test failed first, or what was raised; "" where none did
+    detector   that check's run or that test
+    durations  in s, of the tests that were run
+    """
+
+    failure: str
+    detector: Detector | None = None
+    durations: dict[str, float] | None = None
+
+
+def noticed_by(mutant: Mutant, likely: list[Detector], durations: dict[str, float]) -> Answer:
+    """Run what belongs to a mutant. For a process of its own."""
     module = mutant.target.module
     _, tree = next(islice(changed_modules(mutant.target), mutant.number, None))
     sys.meta_path.insert(0, _Changed(module, tree))  # type: ignore[arg-type]
     try:
-        return first_failure(mutant.target.kind, mutant.target.tests)
+        return first_failure(mutant.target.kind, mutant.target.tests, likely, durations)
     except BaseException as exc:
-        return f"raised {type(exc).__name__}: {str(exc)[:60]}"
+        return Answer(f"raised {type(exc).__name__}: {str(exc)[:60]}")
 
 
 class _FirstFailure:
-    name = ""
+    """Orders tests by the time they took without any change, limits each, and keeps the name of the
+    one that failed."""
+
+    def __init__(self, durations: dict[str, float]) -> None:
+        self.name = ""
+        self.known = durations
+        self.durations: dict[str, float] = {}
+
+    def pytest_collection_modifyitems(self, items: list[Any]) -> None:
+        items.sort(key=lambda item: self.known.get(item.nodeid, 0.0))
+
+    def pytest_runtest_setup(self) -> None:
+        end_after(LIMIT_S)
 
     def pytest_runtest_logreport(self, report: Any) -> None:
+        self.durations[report.nodeid] = self.durations.get(report.nodeid, 0.0) + report.duration
+        self.pytest_collectreport(report)
+
+    def pytest_collectreport(self, report: Any) -> None:
+        # a module that cannot be imported is a failure, too
         if report.failed and not self.name:
             self.name = report.nodeid
 
-    pytest_collectreport = pytest_runtest_logreport  # a module that cannot be imported
 
-
-def first_failure(kind: str, tests: tuple[str, ...]) -> str:
+def first_failure(
+    kind: str,
+    tests: tuple[str, ...],
+    likely: Sequence[Detector] = (),
+    durations: dict[str, float] | None = None,
+) -> Answer:
+    """Run the scenes of a kind and the tests until one fails; the likely ones before the others."""
     from support.checking import failed, judged, results_file
 
+    runs = [(scene, method) for scenes, method in RUNS[kind] for scene in scenes.split()]
+    runs.sort(key=lambda run: run not in likely)
+    likely_tests = [test for test in likely if isinstance(test, str)]
+    first = _FirstFailure(durations or {})
     with (
         redirect_stdout(io.StringIO()),
         redirect_stderr(io.StringIO()),
         tempfile.TemporaryDirectory() as folder,
     ):
-        for number, (scenes, method) in enumerate(RUNS[kind]):
-            # What does not end is ended by the fork's limit: on a busy machine a right run may take
+        for number, (scene, method) in enumerate(runs):
+            end_after(LIMIT_S)
+            # What does not end is ended by the limit above: on a busy machine a right run may take
             # its minute.
-            path = results_file(
-                Path(folder) / f"{number}.h5", scenes.split(), [method], timeout_s=1e4
-            )
+            path = results_file(Path(folder) / f"{number}.h5", [scene], [method], timeout_s=1e4)
             for check in failed(judged(path)):
-                return f"check {check.name}: {' '.join(check.where)}"
-        first = _FirstFailure()
-        paths = [str(ROOT / "tests" / test) for test in tests]
-        if paths and pytest.main(["-q", "-x", "-p", "no:cacheprovider", *paths], [first]):
-            return f"test {first.name or 'not found'}"
-    return ""
+                return Answer(f"check {check.name}: {' '.join(check.where)}", (scene, method))
+        for names in (likely_tests, [f"tests/{test}" for test in tests]):
+            paths = [str(ROOT / name) for name in names]
+            if paths and pytest.main(["-q", "-x", "-p", "no:cacheprovider", *paths], [first]):
+                detector = first.name if "::" in first.name else None
+                return Answer(f"test {first.name or 'not found'}", detector)
+    return Answer("", None, first.durations)
 
 
-def answer_of_fork(call: Callable[[], str], limit_s: float | None = None) -> str:
-    """Return what a call returns in a fork of this process, or that it has not returned within the
-    limit."""
+def end_after(seconds: float) -> None:
+    """End this process once it has used so much more processor time."""
+    used = resource.getrusage(resource.RUSAGE_SELF)
+    limit = math.ceil(used.ru_utime + used.ru_stime + seconds)
+    resource.setrlimit(resource.RLIMIT_CPU, (limit, resource.RLIM_INFINITY))
+
+
+def answer_of_fork(call: Callable[[], Answer]) -> Answer:
+    """Return what a call returns in a fork of this process, or that it has not returned within its
+    limits."""
     context = get_context("fork")
     receiver, sender = context.Pipe(duplex=False)
     fork = context.Process(target=lambda: sender.send(call()))
@@ -652,12 +719,32 @@ def answer_of_fork(call: Callable[[], str], limit_s: float | None = None) -> str
     sender.close()
     with receiver, suppress(EOFError):
         try:
-            if receiver.poll(limit_s):
-                return str(receiver.recv())
+            if receiver.poll(LIMIT_OF_WAITING_S):
+                answer: Answer = receiver.recv()
+                return answer
         finally:
             fork.kill()
             fork.join()
-    return "did not end, or took its process with it"
+    return Answer("did not end, or took its process with it")
+
+
+class Trial:
+    """Tries mutants, each first by what noticed the last ones of its function and its module."""
+
+    def __init__(self, durations: dict[str, float]) -> None:
+        self.durations = durations
+        self.recent: dict[str, list[Detector]] = {}
+
+    def __call__(self, mutant: Mutant) -> str:
+        places = (mutant.name.split()[0], mutant.target.module)
+        likely = [found for place in places for found in self.recent.get(place, [])[:2]]
+        likely = list(dict.fromkeys(likely))
+        answer = answer_of_fork(partial(noticed_by, mutant, likely, self.durations))
+        if answer.detector is not None:
+            for place in places:
+                others = [found for found in self.recent.get(place, []) if found != answer.detector]
+                self.recent[place] = [answer.detector, *others]
+        return answer.failure
 
 
 def main() -> None:
@@ -670,19 +757,14 @@ def main() -> None:
     parser.add_argument(
         "--log", type=Path, metavar="FILE", help=("mutants that it has are not tried again")
     )
-    parser.add_argument(
-        "--limit",
-        type=float,
-        default=TIME_LIMIT_S,
-        metavar="S",
-        help=("a mutant's (default: %(default)s)"),
-    )
     arguments = parser.parse_args()
     sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
+    sys.dont_write_bytecode = False  # or every fork compiles the package and the tests
+    os.environ["PYTEST_DISABLE_PLUGIN_AUTOLOAD"] = "1"  # which take longer than most tests
     os.environ["XDG_CACHE_HOME"] = str(ROOT / ".pytest_cache" / "compiled")  # as in conftest.py
-    for engine in ("exudyn", "mujoco", "heyoka", "scipy.integrate", "scipy.special", "h5py"):
-        if importlib.util.find_spec(engine):
-            importlib.import_module(engine)
+    for package in PACKAGES:
+        if importlib.util.find_spec(package.partition(".")[0]):
+            importlib.import_module(package)
     mutants = all_mutants(arguments.pattern)[:: arguments.every]
     log: Path | None = arguments.log
     if log is not None and log.exists():
@@ -692,16 +774,16 @@ def main() -> None:
         tests = tuple(dict.fromkeys(test for mutant in mutants for test in mutant.target.tests))
         kinds = dict.fromkeys(mutant.target.kind for mutant in mutants)
         calls = [
-            *(partial(first_failure, kind, ()) for kind in kinds),
             partial(first_failure, "tests alone", tests),
+            *(partial(first_failure, kind, ()) for kind in kinds),
         ]
-        for failure in pool.map(answer_of_fork, calls):
-            if failure:
-                raise SystemExit(f"without any change: {failure}")
-        calls = [partial(noticed_by, mutant) for mutant in mutants]
-        answers = pool.map(partial(answer_of_fork, limit_s=arguments.limit), calls)
-        for mutant, noticed in zip(mutants, answers, strict=True):
-            line = f"{mutant.name}: {noticed or 'survived'}"
+        answers = list(pool.map(answer_of_fork, calls))
+        for answer in answers:
+            if answer.failure:
+                raise SystemExit(f"without any change: {answer.failure}")
+        failures = pool.map(Trial(answers[0].durations or {}), mutants)
+        for mutant, failure in zip(mutants, failures, strict=True):
+            line = f"{mutant.name}: {failure or 'survived'}"
             print(line, flush=True)
             if log is not None:
                 with log.open("a") as stream:
