@@ -12,6 +12,7 @@ from support.scenes import paper
 
 from rotor_mbs.errors import MethodRefusal
 from rotor_mbs.methods.solve import solve
+from rotor_mbs.models.printed import literal
 from rotor_mbs.models.printed.methods import METHODS
 
 PI = math.pi
@@ -54,6 +55,17 @@ def test_one_blade_is_a_pendulum_that_does_not_pitch(given, lean, method):
     # Tolerance 1e-12 a step, some 1e3 steps.
     np.testing.assert_allclose(result.trajectory.angles[:, 0], exact, atol=1e-9)
     assert not result.trajectory.angles[:, 1].any()
+
+
+@pytest.mark.parametrize("count", [1, 3])
+def test_without_c_a_torque_turns_the_rotor_about_its_shaft(count):
+    # m d² q̈2 = τ + m g d sin q2, summed over the blades. Small numbers, beside which 0.001 shows.
+    m, d, torque, q2 = 2.0, 3.0, 5.0, 0.7
+    phases = [2.0 * PI * i / count for i in range(count)]
+    weights = sum(m * 9.8 * d * math.sin(q2 + phase) for phase in phases)
+    exact = (torque + weights) / (count * m * d**2)
+    found = literal.fixed_pitch_acceleration(m, d, 9.8, torque, q2, phases)
+    assert found == pytest.approx(exact, abs=1e-14)  # round-off of terms of order one
 
 
 def test_constant_torque_turns_a_balanced_rotor():

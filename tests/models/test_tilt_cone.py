@@ -225,7 +225,13 @@ def test_the_order_of_convergence_is_that_of_upright_rotors(method: str, order: 
 
 
 @pytest.mark.parametrize(
-    "method", ["exudyn_tree/rk67", pytest.param(CHAIN, marks=pytest.mark.full), "mujoco/rk4"]
+    "method",
+    [
+        "lagrange/dop853",
+        "exudyn_tree/rk67",
+        pytest.param(CHAIN, marks=pytest.mark.full),
+        "mujoco/rk4",
+    ],
 )
 def test_blades_without_pitch_inertia_lean_with_the_hub(method: str) -> None:
     """A coned rod on its pitch axis, fixed to the hub, beside a blade that pitches."""
