@@ -668,7 +668,18 @@ def noticed_by(mutant: Mutant, likely: list[Detector], durations: dict[str, floa
 
 
 def put_in_place(module: str, scope: str, tree: ast.Module) -> bool:
-    """Give a loaded function its changed code; False where there is no such function."""
+    """Give a loaded function its changed code.
+
+    Parameters
+    ----------
+    module, scope : names of the module, and of a function or of methods in it.
+    tree : the module with the change.
+
+    Returns
+    -------
+    bool
+        False where there is no such function.
+    """
     loaded, found = importlib.import_module(module), False
     codes = [constant for constant in compile(tree, module, "exec").co_consts if _is_code(constant)]
     codes += [constant for code in codes for constant in code.co_consts if _is_code(constant)]
@@ -723,7 +734,14 @@ def first_failure(
     likely: Sequence[Detector] = (),
     durations: dict[str, float] | None = None,
 ) -> Answer:
-    """Run the scenes of a kind and the tests until one fails; the likely ones before the others."""
+    """Run the scenes of a kind and the tests until one fails.
+
+    Parameters
+    ----------
+    kind, tests : of a `Target`.
+    likely : runs and tests that come before the others.
+    durations : in s, of each test without any change; cheap ones come first.
+    """
     from support.checking import failed, judged, results_file
 
     runs = [(scene, method) for scenes, method in RUNS[kind] for scene in scenes.split()]
