@@ -25,6 +25,7 @@ from rotor_mbs.models.lagrange.parameters import Number, rate_units, rotor_form
 from rotor_mbs.models.lagrange.samples import quad_loads
 from rotor_mbs.models.lagrange.taylor import Propagation
 from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.solution.defects import row_blocks
 from rotor_mbs.solution.trajectory import Array, Integration, Trajectory
 
 # The uncertainty is this many times what two runs show. They differ in their truncation errors and
@@ -180,7 +181,8 @@ def _variational_matrices(scene: Scene, times: Array | None = None) -> Array:
     count = 2 * len(scene.moving_coordinates)
     propagation = Propagation(scene, variational=True, compact_mode=True, times=times)
     propagation.integrate()
-    return np.asarray(propagation.states[:, count:].reshape(-1, count, count))
+    # No copy: those of a million samples are half a gigabyte. The state is the first of the rows.
+    return np.asarray(propagation.states.reshape(-1, 1 + count, count)[:, 1:])
 
 
 def _matrices_by_quotients(scene: Scene, times: Array) -> Array:
@@ -226,10 +228,11 @@ def _largest_growth(scene: Scene, matrices: Array) -> Array:
         finite, and at the samples after them.
     """
     growth = np.full(max(scene.samples, len(matrices)), np.inf)
-    finite = np.flatnonzero(np.isfinite(matrices).all(axis=(1, 2)))
     free = free_variables(scene)
-    scaled = _in_units(scene, matrices[finite])[:, free[:, None], free]
-    growth[finite] = np.linalg.norm(scaled, ord=2, axis=(1, 2))
+    for rows in row_blocks(len(matrices)):
+        finite = np.isfinite(matrices[rows]).all(axis=(1, 2))
+        scaled = _in_units(scene, matrices[rows][finite])[:, free[:, None], free]
+        growth[rows][finite] = np.linalg.norm(scaled, ord=2, axis=(1, 2))
     return growth
 
 
