@@ -120,7 +120,7 @@ def print_targets(folder: Path) -> None:
             (folder / "results.h5").unlink(missing_ok=True)
             rounds.append(measured([*COMMAND, *words.split()], folder))
         show(f"rotor-mbs {words}", target, min(rounds, key=lambda usage: usage.processor))
-    opening = f"import xarray; xarray.open_datatree({results!r}).load()"
+    opening = f"import xarray; xarray.open_datatree({results!r})"
     show("xarray.open_datatree", "1 s", measured([sys.executable, "-c", opening], folder))
     show_run("rm.run, own scene, 501 samples", "10 ms", folder, OWN)
     shipped = 'scene = rm.scene("paper/fig11")'
@@ -149,8 +149,12 @@ def print_growth(folder: Path) -> None:
         'Path("million.toml").write_text(text)'
     )
     measured([sys.executable, "-c", million], folder)
-    words = "run million.toml -m lagrange/taylor -o million.h5"
-    show("rotor-mbs run, 1e6 samples", "1 GB", measured([*COMMAND, *words.split()], folder))
+    words = "run million.toml -m lagrange/taylor -o million.h5 --timeout 3000"
+    show(
+        "rotor-mbs run, 1e6 samples, with reference",
+        "1 GB",
+        measured([*COMMAND, *words.split()], folder),
+    )
     for duration in (10, 50, 200):
         scene = f'scene = rm.scene("paper/fig11").replace(duration={duration}.0, samples=1001)'
         show_run(f"rm.run, {duration} s in 1001 samples", "", folder, scene)
