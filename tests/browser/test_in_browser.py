@@ -400,7 +400,7 @@ def test_without_scripts_the_answer_the_tables_and_the_main_plots_are_there(
     assert page.run("document.querySelector('table').offsetHeight") > 20
     assert page.run("document.querySelector('noscript').textContent.includes('JavaScript')")
     stills = page.run(
-        "[...document.querySelectorAll('.still svg')].filter(s => s.getBoundingClientRect().height "
+        "[...document.querySelectorAll('.still>svg')].filter(s => s.getBoundingClientRect().height "
         "> 100).length"
     )
     assert 1 <= stills <= 6
