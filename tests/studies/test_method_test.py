@@ -422,7 +422,7 @@ FIVE = replace(five_blades(), outputs=("angles", "rates"))
 OTHERS: dict[str, tuple[Any, Mistakes, str]] = {
     "right": ({}, other_code.NONE, ""),
     "hub": ({"hub_inertia": 25.0}, other_code.NONE, "the hub's inertia once for each blade"),
-    "rest": ({"bearing_rest": ()}, other_code.NONE, "rest angles of the springs ignored"),
+    "rest": ({"bearing_rest": ()}, other_code.NONE, "without the rest angles of the springs"),
     "Steiner": ({"blades": changed_blades(FIVE, 0.0)}, other_code.NONE, "without Steiner's share"),
     "Steiner twice": (
         {"blades": changed_blades(FIVE, 2.0)},
