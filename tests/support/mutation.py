@@ -26,6 +26,7 @@ import re
 import resource
 import sys
 import tempfile
+import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import redirect_stderr, redirect_stdout, suppress
@@ -639,7 +640,7 @@ class Answer(NamedTuple):
 
     failure    which check or test failed first, or what was raised; "" where none did
     detector   that check's run or that test
-    durations  in s, of the tests that were run
+    durations  in s of processor time, of the tests that were run
     """
 
     failure: str
@@ -704,22 +705,24 @@ def _is_code(constant: object) -> bool:
 
 
 class _FirstFailure:
-    """Orders tests by the time they took without any change, limits each, and keeps the name of the
-    one that failed."""
+    """Orders tests by the processor time they took without any change, limits each, and keeps the
+    name of the one that failed."""
 
     def __init__(self, durations: dict[str, float]) -> None:
         self.name = ""
         self.known = durations
         self.durations: dict[str, float] = {}
+        self.began = 0.0
 
     def pytest_collection_modifyitems(self, items: list[Any]) -> None:
         items.sort(key=lambda item: self.known.get(item.nodeid, 0.0))
 
     def pytest_runtest_setup(self) -> None:
         end_after(LIMIT_S)
+        self.began = time.process_time()
 
     def pytest_runtest_logreport(self, report: Any) -> None:
-        self.durations[report.nodeid] = self.durations.get(report.nodeid, 0.0) + report.duration
+        self.durations[report.nodeid] = time.process_time() - self.began
         self.pytest_collectreport(report)
 
     def pytest_collectreport(self, report: Any) -> None:
@@ -880,7 +883,7 @@ def main() -> None:
 def durations_without_change(
     pool: ThreadPoolExecutor, tests: tuple[str, ...], kinds: Iterable[str]
 ) -> dict[str, float]:
-    """Return how long each test takes without any change, in s. Ends where one fails."""
+    """Return the processor time of each test without any change, in s. Ends where one fails."""
     calls = [
         partial(first_failure, "tests alone", tests),
         *(partial(first_failure, kind, ()) for kind in kinds),
