@@ -226,6 +226,11 @@ def test_a_bound_is_multiplied_by_the_length_of_an_interval_and_by_the_growth_ov
     assert judged((1e-9, np.nan, 2e-9))[1] == np.inf
 
 
+def test_the_drift_is_what_defects_of_one_sign_add_up_to_in_a_hundred_rows() -> None:
+    """The last fifty rows of this run add up to half."""
+    assert made_defects([1e-9] * 250).drift == pytest.approx(1e-7)
+
+
 def test_each_interval_and_each_coordinate_has_its_own_floor() -> None:
     """Three times: of the row before, carried on, and the row after; a row that is rough excuses no
     other."""

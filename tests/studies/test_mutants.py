@@ -103,6 +103,10 @@ EXPLAINED = {
     r"time_table\.values_before .*1e-12 scaled": (
         "keeps rounding from passing a jump: any size near it does"
     ),
+    r"defects\._SMALLEST_FLOOR ": (
+        "keeps a floor from being zero: any size far below round-off of a radian does"
+    ),
+    r"defects\.KEPT_ROWS ": "decides how much memory a run takes, not what comes out",
     r"judgement\.smallest_rotor_inertia_share .*65 -> 66": (
         "points of a search along the way to the next sample"
     ),
