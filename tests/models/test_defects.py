@@ -231,6 +231,30 @@ def test_the_drift_is_what_defects_of_one_sign_add_up_to_in_a_hundred_rows() -> 
     assert made_defects([1e-9] * 250).drift == pytest.approx(1e-7)
 
 
+def test_a_pitch_that_is_fixed_has_the_defect_by_which_it_moves() -> None:
+    """It keeps its angle, and its rate of zero."""
+    scene = paper("fig04b", duration=1.0, samples=11, outputs=("angles", "rates"))
+    scene = replace(scene, initial_angles=(scene.initial_angles[0], 0.3))
+    run = solve(DOP853, scene, {}).trajectory
+    assert not defects_of(scene, run).angles[:, 1].any()
+    angles, rates = run.angles.copy(), run.rates.copy()
+    angles[5, 1] += 1e-3
+    rates[5, 1] += 2e-3
+    defects = defects_of(scene, run.replace(angles=angles, rates=rates))
+    assert defects.angles[4:6, 1] == pytest.approx([-1e-3, 1e-3], abs=1e-15)
+    assert defects.rates[4:6, 1] == pytest.approx([-2e-3, 2e-3], abs=1e-15)
+
+
+def test_of_a_sum_over_rows_the_rows_at_its_ends_are_rounded() -> None:
+    """That at the start is carried on, twice as large; those in between cancel."""
+    rounding = np.zeros((7, 2))
+    rounding[:, 0] = [1e-10, 1.0, 1.0, 2e-10, 1.0, 1.0, 4e-10]
+    transitions = np.tile(np.eye(2), (6, 1, 1))
+    transitions[1, 0, 0] = 2.0
+    defects = made_defects([0.0] * 6, rounding=rounding, transitions=transitions)
+    assert defects.over_rows(3)[1][:, 0] == pytest.approx([4e-10, 6e-10])
+
+
 def test_each_interval_and_each_coordinate_has_its_own_floor() -> None:
     """Three times: of the row before, carried on, and the row after; a row that is rough excuses no
     other."""
