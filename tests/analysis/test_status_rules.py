@@ -232,6 +232,22 @@ def test_a_defect_of_a_hundredth_of_a_radian_is_never_within_an_ok(
     assert is_ok == (expected == "ok")
 
 
+@pytest.mark.parametrize(
+    ("engine", "samples", "expected"),
+    [
+        (DONE, SCENE.samples, True),
+        (DONE, SCENE.samples - 1, False),
+        (FAILED, SCENE.samples, False),
+    ],
+)
+def test_a_run_that_failed_or_is_not_complete_is_not_clearly_ok(
+    engine: Integration, samples: int, expected: bool
+) -> None:
+    metrics = {"energy_drift_max": 0.0}
+    (is_ok,) = clearly_ok([SCENE], METHOD, [engine], [samples], [metrics], np.ones(1))
+    assert is_ok == expected
+
+
 def test_a_bound_of_more_than_a_hundredth_of_a_radian_counts_as_that(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

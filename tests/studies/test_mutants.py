@@ -131,6 +131,9 @@ EXPLAINED = {
         "keeps rounding from putting a sample past the end of its interval, in runs of thousands "
         "of intervals"
     ),
+    r"ode45\.first_step .*h_max \* rate_of_change scaled": (
+        "where it decides, either step is the same"
+    ),
     r"ode45\._after_success .*0\.2 -> ": (
         "where steps begin to grow fivefold at most, they grow as much by either rule"
     ),
