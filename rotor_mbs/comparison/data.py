@@ -384,13 +384,17 @@ def _precision(columns: Sequence[Array], rounding: Sequence[Array]) -> str:
     rounding : `rounding_of_printed` of each.
     """
     rounded = []
+    digits = 0  # of the rounded columns: others may have all digits
     for values, last in zip(columns, rounding, strict=True):
         sizes = np.abs(values)
         if (last > 10.0**-_FEW_DIGITS * sizes).any():
             rounded.append((sizes, last))
+            digits = max(digits, _significant_digits(values))
     if not rounded:
         return ""
-    digits = max(map(_significant_digits, columns))
+    # A column of zeros has no digits.
+    count = sum(bool(np.any(values)) for values in columns)
+    where = "" if len(rounded) >= count else f" in {len(rounded)} of {count} columns"
     if digits >= _SINGLE_DIGITS:
         for sizes, last in rounded:
             if sizes.any() and (last == sizes * _SINGLE).all():
@@ -403,8 +407,8 @@ def _precision(columns: Sequence[Array], rounding: Sequence[Array]) -> str:
     if is_fixed and max(exceptions) < _MAX_EXCEPTIONS:
         decimals = sorted({round(-math.log10(2.0 * last.min())) for _, last in rounded})
         shown = " or ".join(map(str, decimals))
-        return f"{shown} decimals: rounding error {0.5 * 10.0 ** -decimals[0]:.0e}"
-    return f"{digits} digits: relative rounding error {0.5 * 10.0 ** (1 - digits):.0e}"
+        return f"{shown} decimals{where}: rounding error {0.5 * 10.0 ** -decimals[0]:.0e}"
+    return f"{digits} digits{where}: relative rounding error {0.5 * 10.0 ** (1 - digits):.0e}"
 
 
 def _time_precision(time: Array, rounding: Array, *, is_equidistant: bool) -> str:

@@ -372,3 +372,14 @@ def test_right_numbers_of_any_digits_are_not_systematic(digits: int, run: rm.Run
             compared.verdict.notes
         )
         assert compared.likely == ()
+
+
+def test_digits_of_angles_are_told_beside_rates_with_all_digits(run: rm.Run) -> None:
+    columns = by_name(run)
+    for label in run.scene.coordinate_labels:
+        columns[label] = np.round(columns[label], 4)
+    compared = rm.compare(columns, SCENE)
+    assert compared.status == "ok"
+    assert compared.verdict.notes == (
+        "numbers of 4 decimals in 4 of 8 columns: rounding error 5e-05",
+    )
