@@ -43,9 +43,9 @@ from rotor_mbs.solution.trajectory import Integration, Solution, Trajectory
 _CHECKS = ("energy_drift_max", "defect_max", "angle_error_max")
 
 # An engine's claim of success of an inaccurate run is not called false if the run resembles the
-# motion. Then its energy drift (relative to the energy scale), its defects (rad) and the errors of
-# its quantities (relative to their scales) are at most the first of these numbers, and its angle
-# error up to the horizon (rad) is at most the second.
+# motion. It does if its energy drift (relative to the energy scale), its defects (rad) and the
+# errors of its quantities (relative to their scales) are at most the first of these numbers, and
+# its angle error up to the horizon (rad) is at most the second.
 _RESEMBLES = 1e-2
 _RESEMBLING_ANGLE = 1.0
 
@@ -125,8 +125,8 @@ def clearly_ok(
 ) -> NDArray[np.bool_]:
     """Return whether each of k runs of a method is certain to be ok, (k,).
 
-    That is what `judge` would say without a reference, from a few numbers. A run that is not
-    clearly ok may be ok all the same.
+    A few numbers of each run suffice to know that `judge` would call it ok without a reference. A
+    run that is not clearly ok may be ok all the same.
 
     Parameters
     ----------
@@ -164,7 +164,7 @@ def _is_close(scene: Scene, status: str, metrics: Metrics) -> bool:
 
     Parameters
     ----------
-    scene : scales of quantities are relative to it.
+    scene : its outputs and scales decide which errors of quantities there are, and their size.
     status, metrics : of the run.
     """
     if status != "inaccurate":
@@ -294,9 +294,9 @@ def _too_far_apart(defects: Defects, count: int) -> str:
 def smallest_rotor_inertia_share(scene: Scene, run: Trajectory) -> float:
     """Return the smallest share of the rotor's inertia near the last sample of a run.
 
-    The share is S / (rotor inertia). S = J_hub + Σ (a - b²/Jzz) is the rotor's inertia if every
-    pitch is free to give way; the summand of a point mass is m (c² + d²) cos²θ. The smallest share
-    on the straight line from the last sample to the next one is returned.
+    The share is the rotor's inertia with every pitch free to give way, divided by that with fixed
+    pitches, see `models.lagrange.singularity`. The smallest share on the straight line from the
+    last sample to the next one is returned.
 
     Parameters
     ----------

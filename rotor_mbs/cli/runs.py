@@ -63,8 +63,8 @@ def run(arguments: argparse.Namespace) -> int:
 def reproduce(arguments: argparse.Namespace) -> int:
     """Compute every scene of the paper, and write the report.
 
-    Nothing is done if the last call succeeded, and neither its inputs nor the results file have
-    changed since, by a digest over all of them (`studies.reproduce.made_from`).
+    Nothing is done if the last call succeeded, and its inputs and the results file are unchanged
+    since then. A digest over all of them tells whether they are (`studies.reproduce.made_from`).
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def reproduce(arguments: argparse.Namespace) -> int:
     int
         The exit status of `print_summary`, or 0 if nothing had to be done.
     """
-    from rotor_mbs.studies.reproduce import made_from  # late, as below: `run` does without benches
+    from rotor_mbs.studies.reproduce import made_from  # late, as below: `run` needs no benchmarks
 
     start = time.monotonic()
     status = 0
@@ -91,7 +91,7 @@ def reproduce(arguments: argparse.Namespace) -> int:
     else:
         status, text = _reproduce(arguments, results, pages)
         replace_file(summary, text.encode(), rb"\A\s*(result|method) ")
-        # Written last, and only after success: otherwise the next call computes what is missing.
+        # Written last, and only after success: without it the next call computes what is missing.
         if status == 0:
             replace_file(
                 stamp, made_from(results, arguments.timeout).encode(), rb"\A[0-9a-f]{64}\Z"
@@ -118,7 +118,7 @@ def _reproduce(arguments: argparse.Namespace, results: Path, pages: Path) -> tup
 
 
 def reference(arguments: argparse.Namespace) -> int:
-    """Compute the references of scenes, including those that are shipped."""
+    """Compute the references of scenes, also where a reference is shipped."""
     scenes = find_scenes(arguments.scenes)
     with ProgressLine() as progress:
         report = run_scenes(

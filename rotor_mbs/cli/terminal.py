@@ -17,7 +17,7 @@ from rotor_mbs.runs.progress import coloured
 from rotor_mbs.scenario.keys import counted
 from rotor_mbs.solution.status import REFUSED
 
-if TYPE_CHECKING:  # imported late, so that a sweep's workers start before
+if TYPE_CHECKING:  # not loaded here: a sweep's workers start before these are imported
     from rotor_mbs.analysis.text_tables import TextTable
     from rotor_mbs.runs.runner import RunOutcome
     from rotor_mbs.studies.run import BatchReport
@@ -85,15 +85,15 @@ def print_not_computed(made: Sequence[RunOutcome], refused: Sequence[Refusal] = 
 
     Parameters
     ----------
-    made : what a call computed or tried to. Not computed are runs that their method refused when it
-        was built, and runs whose process died or could not start.
+    made : what a call computed or tried to. A run is not computed if its method refused the scene
+        when its solver was built, or if its process died or could not start.
     refused : runs that were left out before.
 
     Returns
     -------
     bool
         Whether one of the runs was asked for by name, or should be tried again: the exit status is
-        not 0.
+        then not 0.
     """
     not_stored = [outcome for outcome in made if not outcome.is_stored]
     lost = [outcome for outcome in not_stored if outcome.status != REFUSED]

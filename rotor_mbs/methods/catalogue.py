@@ -29,7 +29,7 @@ GROUP = "rotor_mbs.methods"
 
 R = TypeVar("R")
 
-# How the names of methods begin, by the place of the tuple that has these methods.
+# Tuples of built-in methods ("package.module:name"), and how the names of their methods begin.
 _BUILT_IN: Mapping[str, tuple[str, ...]] = {
     "rotor_mbs.models.printed.methods:METHODS": ("printed",),
     "rotor_mbs.models.lagrange.methods:METHODS": ("lagrange", REFERENCE),
@@ -101,7 +101,7 @@ def check_names(names: str | Sequence[str]) -> tuple[str, ...]:
     Returns
     -------
     tuple of str
-        Each once, in order; in place of a file those of all its methods.
+        Each name once, in order. A file is replaced by the names of all its methods.
 
     Raises
     ------
@@ -155,7 +155,7 @@ def _installed_name(method: Method) -> str:
 
 
 def errata_methods() -> dict[str, str]:
-    """Return, by erratum ("E1" ...), the method that has no other erratum."""
+    """Return the name of the method that has only one erratum, by erratum ("E1" ...)."""
     return {method.erratum: method.name for method in methods() if method.erratum}
 
 
@@ -211,7 +211,8 @@ def label_of(curve: str) -> str:
     return ", ".join(label for label in (method.label, ladder.label) if label)
 
 
-# Methods of files. They are state of this process, as a file may be edited between two calls.
+# Methods of files. They are kept in variables of this process, and are replaced there if a file has
+# been edited between two calls.
 
 # Files that were named, by model.
 _files: dict[str, MethodFile] = {}
@@ -262,7 +263,7 @@ def _register(file: MethodFile) -> list[str]:
 
 
 def with_method_files(work: Callable[..., R]) -> Callable[..., R]:
-    """Return a function for another process, which first loads this process's method files there.
+    """Return a function that loads this process's method files in another one and calls `work`.
 
     What is printed in the other process, also by `work`, is dropped.
 
@@ -280,7 +281,7 @@ def _call_with_files(
 ) -> R:
     """Call a function after the methods of files have been loaded.
 
-    In another process than `process_id`, which created the call, its output is dropped.
+    The process `process_id` created the call; in any other process the output is dropped.
     """
     for file in files:
         _register(file)

@@ -163,7 +163,8 @@ def supporting_methods(
     scene : the scene.
     names : known methods.
     settings : of the call, checked by `settings_for`; for the methods that have them they override
-        the scene's own and the defaults. None if the caller chooses settings that fit the scene.
+        the scene's own and the defaults. None if no settings are to be checked, as the caller
+        chooses ones that fit the scene.
     are_named : whether the user named the methods.
 
     Raises
@@ -205,7 +206,7 @@ def selected_methods(
     names: Sequence[str] = (),
     settings: Mapping[str, object] | None = None,
 ) -> tuple[dict[str, list[str]], list[str], list[Refusal]]:
-    """Select the methods of each scene: those named, else those that it names itself, else by rule.
+    """Select the methods of each scene: those named, else those of its file, else by the rule.
 
     Parameters
     ----------
@@ -264,8 +265,9 @@ _MAX_EXPLICIT_DECAY = 1e4
 # rad: phase of the fastest oscillation over a run, beyond which fixed steps take minutes and their
 # errors have added up.
 _MAX_FIXED_STEP_TURN = 3e4
-# Inertia of the hub relative to the rotor's largest. A single point-mass blade has no inertia about
-# the shaft at a pitch of ±π/2, and only the hub's is left: below this ratio rates jump there.
+# Ratio of the hub's inertia to the largest that the rotor has at any pitch. A single point-mass
+# blade has no inertia about the shaft at a pitch of ±π/2, and only the hub's is left: below this
+# ratio rates jump there.
 _NEARLY_SINGULAR = 1e-3
 # The same ratio, below which SciPy's shortest step is too long to pass ±π/2: at 3e-13 a run breaks
 # off there, at 3e-10 it passes.
@@ -362,7 +364,7 @@ def fastest_rates(scene: Scene) -> tuple[float, float]:
 
 
 def singular_reason(scene: Scene) -> str:
-    """Return why the mass matrix of a scene is, or must become, singular; "" if it need not.
+    """Return why the mass matrix of a scene is singular or must become so; "" if neither holds.
 
     Only point-mass blades on a hub without inertia can make it so.
 

@@ -83,7 +83,7 @@ def solve(
                     integration = solver.integrate()
                     run_times.append(time.perf_counter() - start)
                     _check_report(method, solver, integration)
-                    if integration.out_of_time:  # the limit would not stop another
+                    if integration.out_of_time:  # a further one would have no limit
                         break
         finally:
             if gc_was_on:

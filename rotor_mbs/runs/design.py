@@ -31,7 +31,8 @@ STATUS_COPIES = {"status": "status_repeated", "samples": "samples_repeated"}
 # Type of a column of computed texts: (run, characters) bytes of UTF-8, filled up with zeros.
 CHARACTER = "S1"
 RUNS = "runs"
-# Arrays of a frozen reference: angles and rates, and what cannot be derived from them as precisely.
+# Arrays of a frozen reference: angles and rates, and those that would be less precise if they were
+# derived from these.
 REFERENCE_ARRAYS = (
     "angles",
     "rates",
@@ -54,7 +55,7 @@ def flags(names: Sequence[str], first: int = 0) -> dict[str, Any]:
     }
 
 
-# Values of a row before its metrics, in the order of the columns; each says which tables have it.
+# Values whose columns precede those of the metrics, in their order; each names its tables.
 _OUTCOME_VALUES = {
     "status": RowValue(
         "1",
@@ -140,7 +141,7 @@ def _column(value: RowValue) -> Column:
     return Column(dimensions, value.units, value.long_name, value.kind)
 
 
-# Every computed column with a value a row.
+# Every computed column that has one value per row.
 COLUMNS = {name: _column(value) for name, value in _ROW_VALUES.items()}
 COLUMNS["status"] = COLUMNS["status"]._replace(attributes=flags(("missing", *STATUSES), MISSING))
 
@@ -293,7 +294,8 @@ class TableSpec:
     ----------
     group : its path in the file; "" for the root.
     runs : (rows,) unique labels or numbers of the rows: the scale of the dimension `run`.
-    known : by name, column and values: known columns of the rows, and scales of other dimensions.
+    known : column and values by name: the known columns of the rows, and the scales of the
+        dimensions other than `run`.
     computed : columns that are filled in later, in the order in which the checksum of a row covers
         them. One without the dimension `run` belongs to the reference.
     attributes : of the group.
@@ -326,7 +328,7 @@ class TableSpec:
 
     @functools.cached_property
     def known_rows(self) -> Mapping[str, Mapping[str, Any]]:
-        """Return the known values of each row by column, by label of the row.
+        """Return, for the label of each row, its known values by column.
 
         It is for tables whose known columns all have the dimension `run`.
         """

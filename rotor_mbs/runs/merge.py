@@ -24,9 +24,10 @@ def fit_file_to_request(
 ) -> TableFile:
     """Make a results file hold the rows of requested tables beside those that it has.
 
-    If the file has all rows as they are requested, nothing is written. Otherwise a file is laid out
-    beside it, the rows that stay are copied, and it replaces the old one. A row is missing
-    afterwards if anything in its design differs (settings, versions, the scene's numbers).
+    If the file has all rows as they are requested, nothing is written. Otherwise a new file is laid
+    out beside it, the rows that stay are copied into it, and the new file replaces the old one. A
+    row is missing afterwards if anything in its design differs (settings, versions, the scene's
+    numbers).
 
     Parameters
     ----------
@@ -132,8 +133,8 @@ def copy_file(source: Path, target: Path) -> None:
     Parameters
     ----------
     source : the file.
-    target : the copy. A file there is replaced if it is of the same kind, and for a sweep of the
-        same sweep, and `source` has all its rows.
+    target : the copy. A file there is replaced if it is of the same kind and `source` has all its
+        stored rows. Different sweeps have no rows in common.
 
     Raises
     ------

@@ -37,7 +37,7 @@ class RowLocation:
     ----------
     path : the file.
     inode : of the file; another file of that name is not written to.
-    first : number of the first row, with which its checksum begins.
+    first : number of the first row, the initial value of its checksum.
     offsets : bytes from the beginning of the file to the first row, by column.
     row_type : its columns are in the order in which the checksum covers them.
     """
@@ -152,7 +152,7 @@ class RowLocation:
         return bool(self.statuses()[0] != MISSING)
 
     def mark_missing(self, rows: Collection[int]) -> None:
-        """Mark rows as missing, counted from the first, before they are computed again."""
+        """Mark rows as missing before they are computed again; 0 is the location's first row."""
         with store_errors(self.path), self.path.open("r+b") as file:
             for row in rows:
                 for name in ("status", STATUS_COPIES["status"]):
@@ -165,7 +165,7 @@ class RowLocation:
 
 def checksums(first: int, rows: Rows, row: np.dtype[np.void]) -> NDArray[np.uint32]:
     """Return the CRC-32 of each row over its number and its columns, (rows,) uint32."""
-    # A sum begins with the number of the row, so that a row in the place of another is detected.
+    # The initial value is the number of the row, so that a row in the place of another is detected.
     sums = [(first + i) & 0xFFFFFFFF for i in range(len(rows["status"]))]
     for name in row.names or ():
         if name == "crc32":

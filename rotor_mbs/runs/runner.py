@@ -78,7 +78,7 @@ class Task(ABC):
 
     @property
     def first(self) -> int:
-        """Return the number of the first row, with which its checksum begins."""
+        """Return the number of the first row, the initial value of its checksum."""
         return self.place.first
 
     @abstractmethod

@@ -10,8 +10,8 @@ so that the file is valid and can be read at every moment. The known columns (sc
 settings, versions, see `runs.design`) are written with the layout and covered by the digest in the
 file's trailer (`runs.trailer`); rows of computed columns have checksums (`runs.rows`).
 
-An HDF5 handle that is open while rows are written reads old values, and one that writes would
-destroy them: nothing is written by the HDF5 library after the layout.
+An HDF5 handle that is open while rows are written reads old values, and would overwrite the new
+rows with them if it wrote. So the HDF5 library writes nothing after the layout.
 """
 
 from __future__ import annotations
@@ -153,8 +153,8 @@ class StoredTable(TableSpec):
     def place(self, row: int = 0) -> RowLocation:
         """Return the location of the rows from number `row` on.
 
-        A checksum begins with the number of the run if runs are numbered, otherwise with that of
-        the row.
+        The initial value of a checksum is the number of the run if runs are numbered, otherwise
+        that of the row.
 
         Parameters
         ----------
@@ -305,11 +305,12 @@ class TableFile:
 _opened: dict[tuple[Path, Path, tuple[int, ...]], TableFile] = {}
 _opening = threading.Lock()  # held while `_opened` is used
 _MAX_OPENED = 4  # files whose tables are kept
-_SETTLED_NS = 100_000_000  # since the last write: a later one then has another time stamp
+# Time after a write from which on a further write has another time stamp.
+_SETTLED_NS = 100_000_000
 
 
 def opened_tables(path: Path, only: Collection[str] | None = None) -> TableFile:
-    """Return the tables of a file, which are read once in this process until it changes.
+    """Return the tables of a file, kept in memory until the file changes.
 
     The layout is kept, that is descriptions and the design of the runs, but no rows.
 
@@ -405,7 +406,7 @@ _REQUIRED_OF_SCENE = (STATUS_COPIES, ("time",), ("title", "scene_toml", "scene_h
 def _check_table(table: StoredTable) -> None:
     """Raise StoreError if a table lacks something that is required, or columns are inconsistent.
 
-    The digest does not replace this check: a file of another program can have a right one.
+    The digest does not replace this check: a file of another program can have a right digest.
 
     Parameters
     ----------

@@ -37,7 +37,7 @@ for _folder in (SCENARIOS, REFERENCES):
     if not _folder.is_dir():
         raise RotorError(f"{_folder}: the folder is missing; install rotor_mbs again")
 
-# How mapping files of columns end; every other TOML file in a folder is a scene.
+# Ending of the names of column mapping files; every other TOML file in a folder is a scene.
 MAPPING_ENDING = ".columns.toml"
 _NO_MOTION = ("samples", "outputs")  # keys that change what is stored, not how the rotor moves
 _SHOWN_CHANGES = 3  # keys in the label of a changed scene
@@ -78,7 +78,7 @@ def find_scenes(arguments: Sequence[str], check: ValuesCheck | None = None) -> l
     Parameters
     ----------
     arguments : names of scenes, folders, and paths of TOML files. A shipped name takes precedence
-        over a path: ./paper is a folder of one's own.
+        over a path; the user's own folder `paper` is written ./paper.
     check : called with the values of each file, returns further problems of them.
 
     Returns

@@ -98,7 +98,7 @@ class RunTask(Task):
                 )
         except (*SYSTEM_ERRORS, MethodRefusal):
             raise
-        except OutOfTimeError as exc:  # from a method that cannot be stopped with its samples
+        except OutOfTimeError as exc:  # the method lost its samples when it was stopped
             return self.failed("timed_out", str(exc))
         except Exception as exc:
             message = str(exc) if isinstance(exc, RotorError) else error_line(exc)
@@ -203,7 +203,7 @@ def run_scenes(
     Raises
     ------
     InputError, StoreError, KeyboardInterrupt
-        The same call then continues where it stopped.
+        After any of them the call can be repeated, and continues where this one stopped.
     """
     requests = requested_runs(scenes, methods, settings or {}, use_frozen=use_frozen)
     with locked(output), pool_of(workers) as pool:
@@ -272,8 +272,9 @@ def missing_runs(
         place = file.place(run.label)
         row = place.read()
         status = STATUSES[row["status"][0]] if place.is_stored else ""
-        # The time limit that ended the stored run; NaN if none did. A shipped reference whose own
-        # samples end early has none and stays; only if reading it took too long it has one.
+        # The time limit that ended the stored run; NaN if none did. For a shipped reference it is a
+        # number only if reading it took too long. One whose own samples end early has NaN, and
+        # stays.
         limit = row["time_limit_s"][0]
         is_short = not limit >= timeout_s
         if run.is_shipped:
