@@ -367,12 +367,13 @@ def rounding_of_printed(
         exponents = np.floor(np.log10(np.where(sizes > 0.0, sizes, 1.0)))
         units = 0.5 * 10.0 ** (exponents + 1 - digits)
         last = np.maximum(last, np.where(sizes > 0.0, units, 0.0))
-    if last.any():
-        return last
+    # Numbers of single precision may seem to have 16 digits, too: doubles from 0.5 to 1, which have
+    # wider gaps than numbers of 16 digits, all do.
     with np.errstate(over="ignore"):  # of what is larger than single precision can be
         single = np.asarray(judged, np.float32).astype(float)
-    precision = _SINGLE if np.array_equal(single, judged) else 2.0**-53
-    return np.asarray(sizes * precision)
+    if np.array_equal(single, judged):
+        return np.maximum(last, sizes * _SINGLE)
+    return last if last.any() else np.asarray(sizes * 2.0**-53)
 
 
 def _precision(columns: Sequence[Array], rounding: Sequence[Array]) -> str:
@@ -398,7 +399,7 @@ def _precision(columns: Sequence[Array], rounding: Sequence[Array]) -> str:
     if digits >= _SINGLE_DIGITS:
         for sizes, last in rounded:
             if sizes.any() and (last == sizes * _SINGLE).all():
-                return f"single precision: relative rounding error {_SINGLE:.0e}"
+                return f"single precision{where}: relative rounding error {_SINGLE:.0e}"
         return ""
     # Digits and decimals are the same for numbers of one size; they are named as decimals only if
     # sizes differ and nearly all numbers have the same rounding.

@@ -383,3 +383,16 @@ def test_digits_of_angles_are_told_beside_rates_with_all_digits(run: rm.Run) -> 
     assert compared.verdict.notes == (
         "numbers of 4 decimals in 4 of 8 columns: rounding error 5e-05",
     )
+
+
+@pytest.mark.parametrize("what", [["angles"], ["angles", "rates"]], ids=["angles", "rates, too"])
+def test_an_angle_from_a_half_to_one_in_single_precision_is_no_fault(what: list[str]) -> None:
+    """Its numbers have 16 digits, as all doubles of that size; half a unit in the last place of
+    single precision explains them all the same."""
+    scene = paper("fig08", duration=1.0, samples=101)
+    run = rm.run(scene, "lagrange/dop853")
+    assert 0.5 < run.angles[:, 1].min() < run.angles[:, 1].max() < 1.0
+    columns = {"time": run.time} | {name: run[name].astype(np.float32) for name in what}
+    compared = rm.compare(columns, scene)
+    assert (compared.status, compared.likely) == ("ok", ())
+    assert not any("what the digits of the data explain" in note for note in compared.verdict.notes)
