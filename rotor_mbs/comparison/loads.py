@@ -460,7 +460,7 @@ def _explained(loads: JudgedLoads, wrong: Sequence[int]) -> tuple[str, ...]:
     for text, names in named.items():
         likely.append(f"{', '.join(_shared_names(loads, names))}: {text}")
     if exchanged:
-        likely.append(f"columns exchanged: {', '.join(exchanged)}")
+        likely.append(f"columns exchanged: {', '.join(_shared_exchanges(loads, exchanged))}")
     return tuple(likely)
 
 
@@ -657,6 +657,31 @@ def _shared_names(loads: JudgedLoads, names: Sequence[str]) -> list[str]:
             place = shown.index(components[0])
             shown = [name for name in shown if name not in components]
             shown.insert(place, load)
+    return shown
+
+
+def _shared_exchanges(loads: JudgedLoads, exchanged: Sequence[str]) -> list[str]:
+    """Return exchanged columns, with a blade's load in place of all its components.
+
+    Parameters
+    ----------
+    loads : the rows that are judged.
+    exchanged : texts such as "blade root force 2 x is blade root force 1 x".
+    """
+    by_load: dict[str, list[Channel]] = {}
+    for channel in loads.channels:
+        by_load.setdefault(_load(channel), []).append(channel)
+    shown = list(exchanged)
+    for load, components in by_load.items():
+        for other in by_load:
+            texts = []
+            for channel in components:
+                axis = channel.name.removeprefix(load)
+                texts.append(f"{channel.name} is {other}{axis}")
+            if len(texts) > 1 and set(texts) <= set(shown):
+                place = shown.index(texts[0])
+                shown = [text for text in shown if text not in texts]
+                shown.insert(place, f"{load} is {other}")
     return shown
 
 

@@ -166,7 +166,10 @@ MISTAKES: dict[str, tuple[Change, list[str]]] = {
     ),
     "blades 1 and 2 exchanged": (
         lambda _, d: {"blade_root_moment": d["blade_root_moment"][:, [1, 0, 2]]},
-        ["columns exchanged: blade root moment 1 x is blade root moment 2 x"],
+        [
+            "columns exchanged: blade root moment 1 is blade root moment 2, "
+            "blade root moment 2 is blade root moment 1"
+        ],
     ),
     "about the centre of mass": (
         about(lambda blade: blade.centre_of_mass),

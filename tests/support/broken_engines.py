@@ -375,7 +375,9 @@ ROWS = {
     "r12_loads_of_blade_1": Engine(
         "root force of blade 1 for all",
         [('"blade_root_force"].append(force)', '"blade_root_force"].append(0 * force + force[0])')],
-        "columns exchanged: blade root force 2 x is blade root force 1 x, blade root force 2 y is",
+        "columns exchanged: blade root force 2 is blade root force 1, blade root force 3 is "
+        "blade root force 1, blade root force 4 is blade root force 1, blade root force 5 is "
+        "blade root force 1$",
     ),
     "r13_pitch_order": Engine(
         "pitches in reverse order of the blades",

@@ -1882,7 +1882,7 @@ NAMED: dict[str, str] = {
     "l12": "pitch actuator moment.*without the dampers",
     "l13": "kN taken as N",
     "l14": "exchanged: blade root moment 1 x is blade root moment 1 y",
-    "l15": "exchanged: blade root moment 2 x is blade root moment 3 x",
+    "l15": "exchanged: blade root moment 2 is blade root moment 3, blade root moment 3 is blade",
     "l16": "of the weight alone",
     "l17": "about the centre of mass in place of the root",
     "l18": "^shaft moment y: without the inertia of the hub",

@@ -909,7 +909,7 @@ NAMED: dict[str, str] = {
     "l03": r"about the point \(0, 0, -1.8\)",
     "l04": "^shaft moment.*in the rotor frame",
     "l06": "with twice the weight",
-    "l09": "exchanged: blade root force 1 x is blade root force 4 x",
+    "l09": "exchanged: blade root force 1 is blade root force 4",
     "l10": "^pitch actuator moment 1: without the pitch torques",
     "l11": "^pitch actuator moment.*sign reversed",
     "l12": "^blade root force 1 z, .*kN taken as N",
