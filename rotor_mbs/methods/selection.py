@@ -320,7 +320,7 @@ def recommend(scene: Scene, defaults: tuple[str, ...]) -> tuple[tuple[str, ...],
         reason = f"long ({turn:.2g} rad of the fastest oscillation): no fixed step"
         return (closed_form,), reason
     others = (name for name in defaults if name != closed_form)
-    reason = "not stiff, nearly singular or long: the default methods, the best of each model"
+    reason = "ordinary scene: the default methods, the best of each model"
     return (closed_form, *others), reason
 
 
