@@ -84,23 +84,8 @@ _LOADS = {
     "bearing_rest": "rest angles of the springs",
 }
 _CYCLES = (2, 5, 10, 20, 50)  # rows, over which a controller may hold its loads
-_DELAYS = (
-    1,
-    2,
-    3,
-    4,
-    5,
-    8,
-    10,
-    15,
-    20,
-    25,
-    30,
-    40,
-    50,
-    75,
-    100,
-)  # rows, by which loads may be late
+# rows, by which loads may be late
+_DELAYS = (1, 2, 3, 4, 5, 8, 10, 15, 20, 25, 30, 40, 50, 75, 100)
 # E3 is the power of a term that is zero without E2.
 _ERRATA = ("E1", "E2", "E1 and E2", "E2 and E3", "E1 and E2 and E3")
 

@@ -25,7 +25,6 @@ class PaperFigure(NamedTuple):
 
     number: str
     kind: str
-    # (letter, scene) of each; the letter may be "", or a torque
     panels: tuple[tuple[str, str], ...]
 
 
