@@ -361,7 +361,7 @@ def test_loads_that_are_made_wrongly_are_named() -> None:
         ),
         (
             {"blade_root_force": np.roll(force, -1, axis=1)},
-            "columns exchanged: blade root force 1 x is blade root force 2 x, ",
+            "columns exchanged: blade root force 1 is blade root force 2, ",
         ),
         (
             {"blade_root_moment": about_centre},
