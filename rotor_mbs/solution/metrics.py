@@ -317,7 +317,6 @@ def defect_metrics(
     horizon_s : that of the reference; None to find it from the defects.
     is_corrected : see `metrics_of`.
     """
-    floor = defects.floor
     metrics = {
         "defect_max": float(defects.sizes.max()),
         "defect_median": float(np.median(defects.sizes)),
@@ -329,6 +328,9 @@ def defect_metrics(
         if horizon_s is None:
             until = defects.horizon_samples(HORIZON_GROWTH)
             horizon_s = float(defects.time[max(until - 1, 0)])
+        # Not of the printed equations: it needs the transition matrices of all intervals, which
+        # take longer than the defects.
+        floor = defects.floor
         metrics |= {
             "defect_floor": float(floor[np.isfinite(floor)].max(initial=0.0)),
             "defects_not_judged": float((~defects.is_judged).sum()),
