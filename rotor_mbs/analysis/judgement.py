@@ -32,6 +32,7 @@ from rotor_mbs.methods.catalogue import find_method_or_none, is_corrected
 from rotor_mbs.models.lagrange.defects import interval_defects
 from rotor_mbs.models.lagrange.singularity import rotor_inertia_shares
 from rotor_mbs.scenario.accuracy_bounds import Bound, Bounds, shipped_bounds
+from rotor_mbs.scenario.keys import counted
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.defects import Defects
 from rotor_mbs.solution.metrics import ANGLE_LIMIT, Metrics, metrics_of
@@ -254,7 +255,7 @@ def _status(
         if not check.passed:
             lost = check.name == "error" and symmetry_loss(run) is not None
             advice = (
-                "; next to try: a method that keeps zeros, lagrange/* or exudyn_tree/*"
+                "; next to try: a method in which the pitch stays zero, lagrange/* or exudyn_tree/*"
                 if lost
                 else ""
             )
@@ -286,8 +287,8 @@ def _too_far_apart(defects: Defects, count: int) -> str:
     length = float(defects.time[worst + 1] - defects.time[worst])
     apart = f"rows {length:.3g} s apart, between which errors grow {defects.growth[worst]:.1e}-fold"
     return (
-        f"{apart}: in {count} intervals a defect of {OK_ERROR:g} rad would not be seen; more "
-        "samples"
+        f"{apart}: in {counted(count, 'interval')} a defect of {OK_ERROR:g} rad would not be seen; "
+        "set a larger number of `samples` in the scene"
     )
 
 

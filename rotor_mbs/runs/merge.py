@@ -64,9 +64,9 @@ def fit_file_to_request(
         has_changed = hashes.get(row["scene"], row["scene_hash"]) != row["scene_hash"]
         if has_changed and run not in wanted_runs:
             lost.append(
-                f"{path}: {row['scene']}: has {row['method_name']} of a scene of that name with "
-                "other numbers, which this call would drop; allowed: another output file, or a "
-                "call that has this method too"
+                f"{path}: {row['scene']}: has a run of {row['method_name']} with other numbers of "
+                "this scene, which this call would remove and not compute again; allowed: another "
+                f"output file, or a call that also runs {row['method_name']}"
             )
     if lost:
         raise InputError(lost)

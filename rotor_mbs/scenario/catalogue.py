@@ -156,7 +156,7 @@ def _name_problem(
     if name in RESERVED_GROUPS or is_folder:
         hint = ""
         if name == "sweep":
-            hint = f"; of a sweep: rotor-mbs sweep {shown_path(path)}"
+            hint = f"; to run a sweep, use: rotor-mbs sweep {shown_path(path)}"
         return f"{name} is a reserved name in results files; allowed: another file name{hint}"
     return ""
 

@@ -426,7 +426,9 @@ def next_to_try(scene: Scene, method: str, settings: Mapping[str, object], statu
     if finer:
         return "; next to try: " + ", ".join(f"{name}={value:.3g}" for name, value in finer.items())
     others = [name for name in default_methods() if name != method and is_corrected(name)]
-    return f"; as fine as its ladder goes, next to try: {others[0]}" if others else ""
+    if not others:
+        return ""
+    return f"; no finer settings of this method are known; next to try: {others[0]}"
 
 
 def without_samples(

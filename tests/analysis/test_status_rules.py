@@ -224,7 +224,7 @@ def test_a_defect_of_a_hundredth_of_a_radian_is_never_within_an_ok(
         judgement = judge(SCENE, Solution(SCENE, METHOD, moving(), DONE), None)
         assert judgement.status == expected
     if expected == "unchecked":
-        assert "would not be seen; more samples" in judgement.message
+        assert "would not be seen; set a larger number of `samples`" in judgement.message
     metrics = (
         {"energy_drift_max": 0.0} | defect_metrics(defects, None) | {"angle_error_predicted": 0.0}
     )

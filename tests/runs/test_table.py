@@ -189,7 +189,7 @@ def test_runs_of_other_numbers_are_not_dropped_without_being_computed_again(tmp_
         1.0,
     )
     with pytest.raises(
-        InputError, match="has lagrange/taylor of a scene of that name with other numbers"
+        InputError, match="has a run of lagrange/taylor with other numbers of this scene"
     ):
         fit_file_to_request(path, results_tables(_asked("exudyn_tree/rk67", gravity=9.81)))
     assert _runs(path) == ["paper/fig08/lagrange/taylor"]

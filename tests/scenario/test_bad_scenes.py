@@ -271,6 +271,7 @@ NO_NAMES = ("", "../paper/fig05", "/paper/fig05", "paper/fig05\n", "paper/\0")
         ("text.txt", "is not a TOML file"),
         ("odd name.toml", "cannot name a scene"),
         ("bench.toml", "bench is a reserved name"),
+        ("sweep.toml", "another file name; to run a sweep, use: rotor-mbs sweep sweep.toml"),
         # resolved to a file; from Python 3.13 on: read
         ("circle.toml", "circle.toml: cannot be re"),
         ("pipe.toml", "is not a regular file"),
@@ -289,7 +290,7 @@ def test_arguments_that_name_no_scene(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     Path("empty").mkdir()
-    for name in ("text.txt", "odd name.toml", "bench.toml"):
+    for name in ("text.txt", "odd name.toml", "bench.toml", "sweep.toml"):
         Path(name).write_text(SCENE, encoding="utf-8")
     Path("circle.toml").symlink_to("circle.toml")
     os.mkfifo("pipe.toml")

@@ -79,7 +79,8 @@ def test_a_run_of_which_only_the_energy_is_known_is_unchecked(tmp_path: Path) ->
     assert (cell.status, cell.outcome) == ("unchecked", "unchecked")
     assert cell.message.startswith("rows 100 s apart")
     assert cell.message.endswith(
-        "in 1 intervals a defect of 0.01 rad would not be seen; more samples"
+        "in 1 interval a defect of 0.01 rad would not be seen; set a larger number of `samples` in the "
+        "scene"
     )
     assert suite_table([cell]).rows == [("lagrange/taylor", "0 of 1", "0")]
     page = write_report(path, tmp_path / "report").read_text(encoding="utf-8")

@@ -15,7 +15,7 @@ from support.runs import run
 from support.scenes import shipped
 
 from rotor_mbs.analysis.judgement import judge
-from rotor_mbs.methods.catalogue import REFERENCE
+from rotor_mbs.methods.catalogue import REFERENCE, default_method, find_method
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.solution.metrics import metrics_of
 from rotor_mbs.studies.run import next_to_try
@@ -69,6 +69,17 @@ def test_loads_of_a_stiff_bearing_are_known_to_the_rounding_of_its_angle(
     moved = replace(exact, trajectory=exact.trajectory.replace(angles=angles, shaft_force=forces))
     assert judge(scene, moved, exact.trajectory).status == status
     assert next_to_try(scene, REFERENCE, {}, "inaccurate") == ""
+
+
+def test_a_run_with_the_finest_settings_is_referred_to_another_method() -> None:
+    scene, method = shipped("turbine/steady"), find_method("exudyn_tree/rk67")
+    interval = scene.duration / (scene.samples - 1)
+    *_, finer, finest = method.ladders[0].settings_by_value(interval).values()
+    advice = next_to_try(scene, method.name, {**method.defaults, **finer}, "inaccurate")
+    assert advice == f"; next to try: step={finest['step']:.3g}"
+    advice = next_to_try(scene, method.name, {**method.defaults, **finest}, "inaccurate")
+    other = default_method()
+    assert advice == f"; no finer settings of this method are known; next to try: {other}"
 
 
 @pytest.mark.parametrize("method", ["exudyn_tree/rk67", "mujoco/rk4"])

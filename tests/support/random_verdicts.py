@@ -122,7 +122,8 @@ def _fault(method: str, status: str, message: str, error: float) -> str:
     if method in EXACT and status != "unchecked":
         return f"exact to rounding, but {status}"
     if status == "unchecked":
-        return "" if "would not be seen; more samples" in message else "unchecked without a reason"
+        is_explained = "would not be seen; set a larger number of `samples`" in message
+        return "" if is_explained else "unchecked without a reason"
     # Of a right motion tips, energies and loads are right, too.
     if status in COMPLETE and error <= RIGHT and not message.startswith(OF_MOTION):
         return f"right to {error:.1e} rad, but {message}"
