@@ -43,15 +43,15 @@ from rotor_mbs.solution.trajectory import Integration, Solution, Trajectory
 # A run that has none of these metrics cannot be judged.
 _CHECKS = ("energy_drift_max", "defect_max", "angle_error_max")
 
-# An engine's claim of success of an inaccurate run is not called false if the run resembles the
-# motion. It does if its energy drift (relative to the energy scale), its defects (rad) and the
+# If an engine reports success of an inaccurate run, this is not called false as long as the run
+# resembles the motion: its energy drift (relative to the energy scale), its defects (rad) and the
 # errors of its quantities (relative to their scales) are at most the first of these numbers, and
 # its angle error up to the horizon (rad) is at most the second.
 _RESEMBLES = 1e-2
 _RESEMBLING_ANGLE = 1.0
 
-# An initial state is not singular if its share of the rotor's inertia, see
-# `smallest_rotor_inertia_share`, is larger.
+# An initial state is certainly not singular if its share of the rotor's inertia is larger than
+# this, see `smallest_rotor_inertia_share`.
 _CLEAR_SHARE = 1e-6
 
 
@@ -99,7 +99,7 @@ def judge(scene: Scene, run: Solution, reference: Trajectory | None) -> Judgemen
     Parameters
     ----------
     scene : the scene.
-    run : only its samples and its engine's report are used.
+    run : its method, its samples and its engine's report are used, not its status and metrics.
     reference : of the scene; without one errors are predicted from the defects.
     """
     bounds = bounds_of(run.method)
@@ -160,8 +160,8 @@ def clearly_ok(
 def _is_close(scene: Scene, status: str, metrics: Metrics) -> bool:
     """Return whether an engine's claim of success may stand.
 
-    The claim of an inaccurate run that resembles the motion is not false, and nothing is known
-    against that of an unchecked run.
+    The claim stands for an inaccurate run if it resembles the motion. It also stands for an
+    unchecked run, as no number contradicts it.
 
     Parameters
     ----------
@@ -195,7 +195,9 @@ def _status(
 ) -> tuple[str, str, str]:
     """Return status, message and advice of a run.
 
-    The order decides: whether the end was reached, a singularity, then the first check that fails.
+    The first of these that holds gives the status: the run did not reach the end; it is one of the
+    printed equations; the scene has no solution up to its end; a check fails; the run could be
+    judged only in part.
 
     Parameters
     ----------

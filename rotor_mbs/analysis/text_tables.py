@@ -43,7 +43,7 @@ def table_of_runs(
 ) -> TextTable:
     """Return a row for each of the requested runs and their references.
 
-    Of more than MOST_ROWS runs the table has a row for each method.
+    If there are more than MOST_ROWS runs, the table has a row for each method instead.
 
     Parameters
     ----------

@@ -55,8 +55,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     if argv is not None:
         return _run(list(argv))
-    # With this variable Python would show the exit as a traceback and wait for input at the end,
-    # also in worker processes, which inherit it.
+    # With PYTHONINSPECT, Python would show the exit as a traceback and wait for input at the end,
+    # also in worker processes, which inherit the variable.
     is_inspected = bool(os.environ.pop("PYTHONINSPECT", ""))
     try:
         status = _run(sys.argv[1:])
@@ -116,7 +116,8 @@ def _run(words: list[str]) -> int:
                 print_line(str(exc), sys.stderr)
                 is_bad_input = isinstance(exc, InputError | MethodRefusal | StoreError)
                 return EXIT_BAD_INPUT if is_bad_input else EXIT_FAILED
-            # If memory lacks for a library, its import raises a SystemError or an ImportError.
+            # If there is not enough memory for a library, its import raises a SystemError or an
+            # ImportError.
             print_line(f"code cannot be loaded: {type(exc).__name__}: {exc}", sys.stderr)
             return EXIT_FAILED
         except MemoryError as exc:
@@ -199,9 +200,9 @@ def _signal_main_thread(number: signal.Signals) -> None:
     if not callable(signal.getsignal(number)):
         return  # the command has ended: the default action of the signal would end its caller
     if hasattr(signal, "pthread_kill"):
-        main = threading.main_thread().ident
-        assert main is not None  # it has started
-        signal.pthread_kill(main, number)
+        main_thread_id = threading.main_thread().ident
+        assert main_thread_id is not None  # it has started
+        signal.pthread_kill(main_thread_id, number)
     else:  # Windows: a system call of the main thread is not broken off
         _thread.interrupt_main(number)
 
@@ -210,7 +211,7 @@ def _signal_main_thread(number: signal.Signals) -> None:
 def _signals_as_interrupts() -> Iterator[None]:
     """Raise KeyboardInterrupt in the block on SIGTERM and SIGHUP, as on Ctrl-C.
 
-    A cluster sends SIGTERM before it kills a process, a terminal that is closed SIGHUP.
+    A cluster sends SIGTERM before it kills a process; a terminal sends SIGHUP when it is closed.
     """
     if threading.current_thread() is not threading.main_thread():
         yield

@@ -64,7 +64,8 @@ def reproduce(arguments: argparse.Namespace) -> int:
     """Compute every scene of the paper, and write the report.
 
     Nothing is done if the last call succeeded, and its inputs and the results file are unchanged
-    since then. A digest over all of them tells whether they are (`studies.reproduce.made_from`).
+    since then. The last call stored a digest over all of them, with which the present one is
+    compared (`studies.reproduce.made_from`).
 
     Parameters
     ----------
@@ -75,7 +76,8 @@ def reproduce(arguments: argparse.Namespace) -> int:
     int
         The exit status of `print_summary`, or 0 if nothing had to be done.
     """
-    from rotor_mbs.studies.reproduce import made_from  # late, as below: `run` needs no benchmarks
+    # Imported here and in `_reproduce`, as it imports the benchmarks, which `run` does not need.
+    from rotor_mbs.studies.reproduce import made_from
 
     start = time.monotonic()
     status = 0
@@ -103,11 +105,11 @@ def reproduce(arguments: argparse.Namespace) -> int:
 
 def _reproduce(arguments: argparse.Namespace, results: Path, pages: Path) -> tuple[int, str]:
     """Compute the runs, write the pages with the same processes, and return status and summary."""
-    load_runs = partial(import_module, "rotor_mbs.studies.reproduce")
+    load_code = partial(import_module, "rotor_mbs.studies.reproduce")
     from rotor_mbs.studies.reproduce import reproduce as reproduce_paper
     from rotor_mbs.studies.reproduce import summary_of
 
-    with local_pool(arguments.jobs, load_runs) as pool, ProgressLine() as progress:
+    with local_pool(arguments.jobs, load_code) as pool, ProgressLine() as progress:
         report, refused = reproduce_paper(
             results, workers=pool, timeout_s=arguments.timeout, on_progress=progress
         )

@@ -86,7 +86,8 @@ def print_not_computed(made: Sequence[RunOutcome], refused: Sequence[Refusal] = 
     Parameters
     ----------
     made : what a call computed or tried to. A run is not computed if its method refused the scene
-        when its solver was built, or if its process died or could not start.
+        when its solver was built, if its process died or could not start, or if the reference of
+        its scene was not computed.
     refused : runs that were left out before.
 
     Returns

@@ -29,7 +29,8 @@ GROUP = "rotor_mbs.methods"
 
 R = TypeVar("R")
 
-# Tuples of built-in methods ("package.module:name"), and how the names of their methods begin.
+# The locations of the tuples of built-in methods ("package.module:name"); for each of them, how the
+# names of its methods begin.
 _BUILT_IN: Mapping[str, tuple[str, ...]] = {
     "rotor_mbs.models.printed.methods:METHODS": ("printed",),
     "rotor_mbs.models.lagrange.methods:METHODS": ("lagrange", REFERENCE),
@@ -44,8 +45,8 @@ _BUILT_IN: Mapping[str, tuple[str, ...]] = {
 def methods() -> tuple[Method, ...]:
     """Return every method but the reference, in the order of tables and legends; plug-ins last."""
     built_in = []
-    for place in _BUILT_IN:
-        built_in += [method for method in _load(place) if method.name != REFERENCE]
+    for location in _BUILT_IN:
+        built_in += [method for method in _load(location) if method.name != REFERENCE]
     return (*built_in, *_plug_ins().values(), *_file_methods.values())
 
 
@@ -62,9 +63,9 @@ def method_names(*, is_corrected: bool | None = None) -> tuple[str, ...]:
 
 def _built_in(name: str) -> Method | None:
     """Return the built-in method of a name, or None; only its own model is imported."""
-    for place, beginnings in _BUILT_IN.items():
+    for location, beginnings in _BUILT_IN.items():
         if name.startswith(beginnings):
-            for method in _load(place):
+            for method in _load(location):
                 if method.name == name:
                     return method
     return None
@@ -155,7 +156,7 @@ def _installed_name(method: Method) -> str:
 
 
 def errata_methods() -> dict[str, str]:
-    """Return the name of the method that has only one erratum, by erratum ("E1" ...)."""
+    """Return, for each erratum ("E1", ...), the name of the method that has this erratum alone."""
     return {method.erratum: method.name for method in methods() if method.erratum}
 
 
@@ -263,9 +264,9 @@ def _register(file: MethodFile) -> list[str]:
 
 
 def with_method_files(work: Callable[..., R]) -> Callable[..., R]:
-    """Return a function that loads this process's method files in another one and calls `work`.
+    """Return a function that loads the method files of this process, and then calls `work`.
 
-    What is printed in the other process, also by `work`, is dropped.
+    It is for a worker process. What is printed there, also by `work`, is dropped.
 
     Parameters
     ----------
@@ -297,9 +298,9 @@ def error_line(error: BaseException) -> str:
 # Methods of packages
 
 
-def _load(place: str) -> tuple[Method, ...]:
-    """Return the methods at "package.module:name", which is imported."""
-    methods: tuple[Method, ...] = resolve_name(place)
+def _load(location: str) -> tuple[Method, ...]:
+    """Import "package.module", and return the methods at the location "package.module:name"."""
+    methods: tuple[Method, ...] = resolve_name(location)
     return methods
 
 
@@ -324,7 +325,7 @@ def _plug_ins() -> dict[str, Method]:
 
     One that cannot be loaded is left out, with a warning.
     """
-    taken = {REFERENCE} | {method.name for place in _BUILT_IN for method in _load(place)}
+    taken = {REFERENCE} | {method.name for location in _BUILT_IN for method in _load(location)}
     plug_ins: dict[str, Method] = {}
     for point in metadata.entry_points(group=GROUP):
         try:

@@ -154,7 +154,7 @@ def supporting_methods(
     *,
     are_named: bool = True,
 ) -> tuple[list[str], list[Refusal]]:
-    """Return those of some methods that can run a scene, and a Refusal for each of the others.
+    """Return which methods can run a scene, and a Refusal for each that cannot.
 
     This is where every command decides what it leaves out.
 
@@ -162,9 +162,9 @@ def supporting_methods(
     ----------
     scene : the scene.
     names : known methods.
-    settings : of the call, checked by `settings_for`; for the methods that have them they override
-        the scene's own and the defaults. None if no settings are to be checked, as the caller
-        chooses ones that fit the scene.
+    settings : those of the call, checked by `settings_for`. A method that has such a setting uses
+        it in place of the scene's own and of its default. With None, settings are not checked: the
+        caller will choose ones that fit the scene.
     are_named : whether the user named the methods.
 
     Raises
@@ -265,9 +265,9 @@ _MAX_EXPLICIT_DECAY = 1e4
 # rad: phase of the fastest oscillation over a run, beyond which fixed steps take minutes and their
 # errors have added up.
 _MAX_FIXED_STEP_TURN = 3e4
-# Ratio of the hub's inertia to the largest that the rotor has at any pitch. A single point-mass
-# blade has no inertia about the shaft at a pitch of ±π/2, and only the hub's is left: below this
-# ratio rates jump there.
+# Ratio of the hub's inertia to the largest that the rotor has at any pitch. A blade that is a point
+# mass does not resist the rotation of the shaft at a pitch of ±π/2, as its pitch gives way. With
+# one such blade only the hub's inertia is left, and below this ratio rates jump there.
 _NEARLY_SINGULAR = 1e-3
 # The same ratio, below which SciPy's shortest step is too long to pass ±π/2: at 3e-13 a run breaks
 # off there, at 3e-10 it passes.
@@ -302,7 +302,7 @@ def recommend(scene: Scene, defaults: tuple[str, ...]) -> tuple[tuple[str, ...],
     if decay * scene.duration > _MAX_EXPLICIT_DECAY and decay > 10.0 * swing:
         reason = f"overdamped (largest decay rate {decay:.2g} 1/s): an implicit method in addition"
         return (closed_form, "lagrange/radau"), reason
-    # One point-mass blade whose pitch may come to ±π/2, where its inertia about the shaft vanishes.
+    # One point-mass blade whose pitch may come to ±π/2, where it does not resist the shaft.
     has_one_point = len(scene.blades) == 1 and scene.blades[0].is_point_mass
     if has_one_point and _leaves_zero_pitch(scene):
         rotor_inertia = _largest_rotor_inertia(scene)

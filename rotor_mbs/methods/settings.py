@@ -60,7 +60,7 @@ def choice(default: object, options: Sequence[object], *, doc: str = "") -> Any:
 
 def _declaration(kind: Kind, unit: str, doc: str) -> dict[str, Any]:
     """Return the metadata of a field, as `Settings.declared` gives them."""
-    # Messages have what is allowed in parentheses, so that the unit is added in words.
+    # Messages have what is allowed in parentheses, therefore the unit is added without brackets.
     note = f", in {unit}" if unit else ""
     return keys.declaration(kind, unit, note, doc=doc)
 

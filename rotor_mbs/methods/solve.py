@@ -21,7 +21,7 @@ from rotor_mbs.solution.trajectory import (
     shape_fault,
 )
 
-_OBSERVING_S = 1.0  # at least, to take the samples after the time limit was reached
+_OBSERVING_S = 1.0  # s that are always left to take the samples, also after the time limit
 
 
 @caller_signals()
@@ -41,8 +41,8 @@ def solve(
     scene : the scene.
     settings : those that differ from the method's defaults.
     repeats : how often to integrate at most; the samples are those of the last time.
-    budget_s : s, of all integrations together: another one is begun only if it is expected to end
-        within it. The first one is not limited by it.
+    budget_s : s, of all integrations together. It does not limit the first one; a further one is
+        begun only if it is expected to end within the budget.
     time_limit_s : s, of all integrations together, after which the running one is stopped.
 
     Returns

@@ -33,7 +33,7 @@ _SIGNALS_OF_END = [
     getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
 ]
 _PER_WORKER = 2  # tasks submitted per worker: one to work on, one waiting
-# Tasks in a row that fail as the system lacks memory, files or processes, before all are given up.
+# If so many tasks in a row fail for lack of memory, files or processes, the others are given up.
 _MAX_SYSTEM_FAILURES = 10
 
 
@@ -76,7 +76,7 @@ class TaskPool(ABC):
         """Return the future of `work(task)`; `timeout_s` is its time limit in s."""
 
     def failure(self, error: BaseException) -> str:
-        """Return why a future failed: "timed_out", "worker_died", or "error" of the task itself."""
+        """Return why a future failed: "timed_out", "worker_died", or "error" raised by the task."""
         return error.failure if isinstance(error, TaskLostError) else "error"
 
     def close(self) -> None:  # noqa: B027  (a pool in this process has nothing to end)
@@ -95,13 +95,15 @@ Workers: TypeAlias = int | TaskPool  # how many processes, or a pool that is ope
 class WorkerPool(TaskPool):
     """Worker processes, each of which keeps its state between tasks.
 
-    A process starts when there is a task for it; with an initializer, as many as there are cores
-    start with the pool. One that dies, or is ended at a time limit, is replaced.
+    A process starts when there is a task for it. If there is an initializer, processes start
+    together with the pool, at most one for each core. A process that dies, or is ended at a time
+    limit, is replaced.
 
     Parameters
     ----------
     workers : how many processes.
-    initializer : called first in every process; an error that it raises is that of the task.
+    initializer : called first in every process; an error that it raises becomes that of the
+        next task of the process.
     core : number of the core to which the processes are bound, if the system allows it; None for
         any.
     environment : default environment variables of the processes; those of this process take
@@ -258,20 +260,20 @@ def run_in(
     retries: dict[str, list[T]] = {"timed_out": [], "worker_died": []}  # by failure
     system_failures = 0  # in a row
 
-    def completed(tasks: Iterable[T], at_once: int) -> Iterator[TaskEnd[T, R]]:
+    def ends_of(tasks: Iterable[T], at_once: int) -> Iterator[TaskEnd[T, R]]:
         waiting: dict[Future[R], T] = {}
         for task in tasks:
             limit = timeout_s(task) if callable(timeout_s) else timeout_s
             waiting[pool.submit(work, task, limit)] = task
             if len(waiting) >= at_once:
-                yield from ended(waiting)
+                yield from next_ends(waiting)
         while waiting:
-            yield from ended(waiting)
+            yield from next_ends(waiting)
 
-    def ended(waiting: dict[Future[R], T]) -> Iterator[TaskEnd[T, R]]:
+    def next_ends(waiting: dict[Future[R], T]) -> Iterator[TaskEnd[T, R]]:
         nonlocal system_failures
         done = wait(waiting, return_when=FIRST_COMPLETED).done
-        # If several have ended, in the order in which they were submitted.
+        # Several may have ended: they are taken in the order in which they were submitted.
         for future in [future for future in waiting if future in done]:
             end = _end_of(waiting.pop(future), future, pool)
             is_system_failure = end.failure == "worker_died" and end.error is not None
@@ -282,7 +284,7 @@ def run_in(
             yield end
 
     for source in (tasks, retries["timed_out"]):
-        for end in completed(source, _PER_WORKER * pool.workers):
+        for end in ends_of(source, _PER_WORKER * pool.workers):
             parts: Sequence[T] = ()
             if split is not None and end.failure in retries:
                 parts = split(end.task)
@@ -291,7 +293,7 @@ def run_in(
             else:
                 yield end
     # One at a time: no other task then takes the memory that one of these may need.
-    for end in completed(retries["worker_died"], 1):
+    for end in ends_of(retries["worker_died"], 1):
         if end.failure == "worker_died":
             yield replace(end, message=f"{end.message}, also when it was retried alone")
         else:

@@ -38,9 +38,9 @@ _ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM
 _PROGRAM = (
     "import sys; sys.path[:] = sys.argv[1:]; from rotor_mbs.processes.serving import serve; serve()"
 )
-_RETRY_START_S = 1.0  # after the system had no room for a process
+_RETRY_START_S = 1.0  # pause after the system could not start a process
 _END_S = 1.0  # until a process whose pipe is closed has ended
-# What a pipe raises whose other end is gone.
+# Errors that are raised by a pipe if its other end is closed.
 _PIPE_ERRORS = (EOFError, ConnectionError, pickle.UnpicklingError)
 
 
@@ -49,8 +49,9 @@ class TaskLostError(RotorError):
 
     Attributes
     ----------
-    failure : "timed_out" if it exceeded its time limit; "worker_died" if its process died, or if it
-        exceeded the time limit while this process has a memory limit, for which it may have waited.
+    failure : "timed_out" if it exceeded its time limit; "worker_died" if its process died. It is
+        "worker_died" for both if this process has a memory limit: a process that exceeded the time
+        limit may then have waited for memory.
     exit_code : of a process that died by itself, negative for the number of a signal; None for one
         that was ended at the time limit.
     """
@@ -70,7 +71,8 @@ class Worker:
 
     Parameters
     ----------
-    initializer : called first in every process; an error that it raises is that of the next task.
+    initializer : called first in every process; an error that it raises becomes that of the
+        next task.
     core : number of the core to which the process is bound, if the system allows it; None for any.
     memory_limit : bytes of address space, if the system can limit it; None for no limit.
     is_silent : whether what the process prints is dropped; otherwise it goes to standard error.
@@ -138,7 +140,7 @@ class Worker:
         Parameters
         ----------
         work, task : a function and its argument, which can be pickled.
-        timeout_s : time limit in s, from when the process, with its initializer done, begins.
+        timeout_s : time limit in s, counted from the start of the task, after the initializer.
 
         Raises
         ------
@@ -148,10 +150,11 @@ class Worker:
             If no process could be started.
         Exception
             What `work` raised. If that cannot be pickled, a RuntimeError with its first line.
-            Also what this process raises while it waits, such as a signal's handler.
+            Also an error that is raised in this process while it waits, for example by the handler
+            of a signal.
         """
         folder = ""
-        with suppress(OSError):  # it is gone
+        with suppress(OSError):  # the folder is gone
             folder = os.getcwd()  # noqa: PTH109  (a text)
         request = pickle.dumps((work, task))
         with self._turn:
@@ -204,8 +207,8 @@ class Worker:
                 beginning = _starter(os.getpid()).submit(self._begin)
             except RuntimeError as exc:
                 raise _not_started(str(exc)) from exc
-            # The error of the start is asked for, not raised: what is raised here is another error,
-            # such as an interrupt.
+            # `exception` returns an error of the start. An error that is raised here has another
+            # cause, such as an interrupt.
             done, _ = wait([beginning], self._set_up_limit_s)
             if not done:
                 raise _not_started(f"the system did not start it in {self._set_up_limit_s:g} s")
@@ -384,14 +387,14 @@ class _Process(subprocess.Popen[bytes]):
             self.kill()
             code = self.wait()
         for stream in (self.stdin, self.stdout):
-            with suppress(OSError):  # what was not sent
+            with suppress(OSError):  # data that was not sent cannot be written any more
                 stream.close()
         return code
 
     def forget(self) -> None:
         """Close the pipes in a forked child of the parent, and wait for nothing.
 
-        What the parent was sending is dropped.
+        The child's copy of data that the parent was sending is dropped.
         """
         self.returncode = 0  # it is no child of this process
         for stream in (self.stdin, self.stdout):

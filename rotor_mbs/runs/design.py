@@ -55,7 +55,8 @@ def flags(names: Sequence[str], first: int = 0) -> dict[str, Any]:
     }
 
 
-# Values whose columns precede those of the metrics, in their order; each names its tables.
+# Computed values of a row, in the order of their columns, which come before those of the metrics.
+# Each has the names of the tables in which it is stored.
 _OUTCOME_VALUES = {
     "status": RowValue(
         "1",
@@ -297,7 +298,7 @@ class TableSpec:
     known : column and values by name: the known columns of the rows, and the scales of the
         dimensions other than `run`.
     computed : columns that are filled in later, in the order in which the checksum of a row covers
-        them. One without the dimension `run` belongs to the reference.
+        them. A column without the dimension `run` belongs to the reference.
     attributes : of the group.
     characters : length of each computed text.
     """
@@ -443,7 +444,8 @@ def results_tables(requests: Sequence[RunRequest]) -> list[TableSpec]:
 def row_order(run: str) -> tuple[Any, ...]:
     """Return a sort key of the label of a run.
 
-    Scenes are in natural order, in each the reference, then methods in the order of the catalogue.
+    Scenes are in natural order. In each scene the reference comes first, then come the methods in
+    the order of the catalogue.
     """
     parts = run.split("/")
     # A method is model/integrator, but the reference has a name without a model.

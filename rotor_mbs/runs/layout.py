@@ -45,8 +45,8 @@ def create_file(
     """Yield a new file with room for all rows of tables, under a temporary name.
 
     It gets its name after the block; if the block raises, it is removed. Its space is reserved
-    before HDF5 writes, as HDF5 does not survive a disk that fills up, and once more afterwards, as
-    HDF5 truncates the file when it opens it.
+    before HDF5 writes, because HDF5 does not survive a disk that fills up. It is reserved again
+    after the layout, because HDF5 truncates the file when it opens it.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ def create_file(
     with replacing(path) as temporary:
         size = _HEAD_BYTES
         for table in tables:
-            # Known columns are counted as 8 bytes each, and four more of them: an estimate.
+            # An estimate: 8 bytes for the value of each known column, and for four more values.
             row_bytes = table.row_type.itemsize + 8 * (4 + len(table.known))
             size += len(table.runs) * row_bytes
         _reserve(temporary, size)
@@ -81,8 +81,8 @@ def create_file(
             file.seek(0, os.SEEK_END)
             file.write(trailer)
         _reserve(temporary, temporary.stat().st_size)
-        # What a reader of the file would find is known: to read it would take longer than to write
-        # it.
+        # The tables are made from what was written: to read them from the file would take longer
+        # than to write it.
         inode = temporary.stat().st_ino
         laid_tables = []
         for table in tables:
@@ -250,7 +250,8 @@ def put_attributes(target: Any, values: Mapping[str, object]) -> None:
     """
     for name, value in values.items():
         if isinstance(value, str):
-            # Nearly all are single texts, which the general way writes three times slower.
+            # Nearly all attributes are single texts. `attrs` of h5py takes three times as long for
+            # them.
             stored = h5py.h5a.create(
                 target.id, name.encode(), TEXT_TYPE, h5py.h5s.create(h5py.h5s.SCALAR)
             )
@@ -267,9 +268,9 @@ def put_attributes(target: Any, values: Mapping[str, object]) -> None:
 def new_file(path: Path, kind: str) -> Iterator[Any]:
     """Yield an HDF5 file in memory, which is written to `path` after the block.
 
-    It is made in memory as HDF5 does not survive a disk that fills up, and a plain write does. If
-    it cannot be written, an earlier file at `path` is unchanged. Whether that may be replaced must
-    be decided before, by `may_extend`.
+    HDF5 makes the file in memory, because it does not survive a disk that fills up; a plain write
+    does. If the file cannot be written, an earlier file at `path` is unchanged. Whether that may be
+    replaced must be decided before, by `may_extend`.
 
     Parameters
     ----------
@@ -285,7 +286,7 @@ def new_file(path: Path, kind: str) -> Iterator[Any]:
     with begin_file(f"{path.name}.{threading.get_ident()}", **memory) as file:
         yield file
         groups: dict[str, Mapping[str, tuple[int, int]]] = {
-            place: {} for place in _groups_with_arrays(file)
+            group_path: {} for group_path in _groups_with_arrays(file)
         }
         file.flush()
         image = io.BytesIO(file.id.get_file_image())
@@ -296,10 +297,10 @@ def new_file(path: Path, kind: str) -> Iterator[Any]:
     write_file(path, image.getbuffer())
 
 
-def _groups_with_arrays(group: Any, place: str = "") -> Iterator[str]:
+def _groups_with_arrays(group: Any, path: str = "") -> Iterator[str]:
     """Yield the path of the group of each array below a group, in the order of writing."""
     for name, item in group.items():
         if is_group(item):
-            yield from _groups_with_arrays(item, f"{place}/{name}" if place else name)
+            yield from _groups_with_arrays(item, f"{path}/{name}" if path else name)
         else:
-            yield place
+            yield path

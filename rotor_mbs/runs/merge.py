@@ -1,4 +1,4 @@
-"""Make a file hold requested rows beside those that it has, and copy files."""
+"""Add requested rows to a results file, and copy files with tables."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from rotor_mbs.runs.versions import machine, versions
 def fit_file_to_request(
     path: Path, wanted: Sequence[TableSpec], replaced: Collection[tuple[str, str, str]] = ()
 ) -> TableFile:
-    """Make a results file hold the rows of requested tables beside those that it has.
+    """Add the rows of requested tables to a results file, which is created if there is none.
 
     If the file has all rows as they are requested, nothing is written. Otherwise a new file is laid
     out beside it, the rows that stay are copied into it, and the new file replaces the old one. A
@@ -58,7 +58,8 @@ def fit_file_to_request(
     wanted_tables = {table.group: table for table in wanted}
     wanted_runs = _known_rows(wanted_tables.get(RUNS))
     hashes = {row["scene"]: row["scene_hash"] for row in wanted_runs.values()}
-    # A file has one scene of each name: runs of the scene with its earlier numbers cannot stay.
+    # A file has only one scene of each name. If its numbers have changed, its stored runs cannot
+    # stay.
     lost = []
     for run, row in _known_rows(stored.get(RUNS)).items():
         has_changed = hashes.get(row["scene"], row["scene_hash"]) != row["scene_hash"]
@@ -128,7 +129,7 @@ def fit_file_to_request(
 
 
 def copy_file(source: Path, target: Path) -> None:
-    """Copy a file with tables; replace one at the target only if no stored row is lost.
+    """Copy a file with tables. A file at the target is replaced only if none of its rows is lost.
 
     Parameters
     ----------

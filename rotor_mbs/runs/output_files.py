@@ -20,12 +20,12 @@ from rotor_mbs.errors import InputError, StoreError
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer as Buffer
 
-_LARGEST_REPLACED = 1 << 28  # bytes, of an output that is not HDF5
-# What a lock file holds, unless its process was killed before it wrote.
+_LARGEST_REPLACED = 1 << 28  # bytes; larger files that are not HDF5 are not replaced
+# Content of a lock file; it is empty if its process was killed before it wrote.
 _OWNER = rb"(process [0-9]+ on [!-~]*)?\Z"
 
 
-# The lock is a file beside the output, which is removed afterwards.
+# The lock is a file beside the output. It is removed when the output is written.
 
 
 @contextmanager
@@ -48,8 +48,8 @@ def locked(output: Path) -> Iterator[None]:
     """
     from filelock import FileLock, Timeout
 
-    place = _resolved(output)
-    path = _lock_of(place)
+    file = _resolved(output)
+    path = _lock_of(file)
     lock = FileLock(path, timeout=0, is_singleton=True)
     if lock.is_locked:  # by this thread: a study takes the lock, and so does what it calls
         yield
@@ -78,8 +78,8 @@ def locked(output: Path) -> Iterator[None]:
         raise StoreError(f"{output}: cannot be written: {exc.strerror}") from exc
     try:
         # Incomplete files of processes that were killed: no other process writes this output now.
-        temporary = re.compile(rf"\.{re.escape(place.name)}\.([0-9]+\.)?tmp")
-        for beside in place.parent.iterdir():
+        temporary = re.compile(rf"\.{re.escape(file.name)}\.([0-9]+\.)?tmp")
+        for beside in file.parent.iterdir():
             if temporary.fullmatch(beside.name):
                 with suppress(OSError):
                     beside.unlink()
@@ -97,8 +97,8 @@ def is_being_written(output: Path) -> bool:
     return _lock_of(_resolved(output)).exists()
 
 
-def _lock_of(place: Path) -> Path:
-    return place.with_name(f".{place.name}.lock")
+def _lock_of(file: Path) -> Path:
+    return file.with_name(f".{file.name}.lock")
 
 
 def _resolved(output: Path) -> Path:
@@ -161,9 +161,9 @@ def write_file(path: Path, content: Buffer) -> None:
 
 
 def refuse_foreign(path: Path, mark: bytes) -> None:
-    """Raise InputError if `path` is a file that is no output of this program of the same kind.
+    """Raise InputError if a file is not an output of this program of the kind to be written.
 
-    For outputs that are no HDF5 files. An empty file may be replaced.
+    This is for outputs that are no HDF5 files. An empty file may be replaced.
 
     Parameters
     ----------

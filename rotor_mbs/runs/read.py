@@ -70,7 +70,7 @@ _TEXTS = ("message", "engine_message")
 
 @dataclass(frozen=True, eq=False)
 class StoredRun:
-    """A run in a file: of a method, the reference, or of a sweep.
+    """A run in a file: that of a method on a scene, the reference of a scene, or one of a sweep.
 
     Its row is read, and verified, when something of it is used.
 
@@ -121,7 +121,10 @@ class StoredRun:
 
     @property
     def reference(self) -> Trajectory | None:
-        """Return the samples of the reference in the file; None without one, and for itself."""
+        """Return the samples of the reference in the file.
+
+        None is returned if the file has none, and if this run is the reference.
+        """
         return None if self.method == REFERENCE else self._read_reference()
 
     @functools.cached_property
@@ -241,7 +244,8 @@ class StoredRun:
 
         Parameters
         ----------
-        complete : whether every sample must exist; if not, as many as there are times.
+        complete : whether the run must have all samples of the scene. If not, it may end early, but
+            each array must have a sample for each of the stored times.
         """
         scene, faults = self.scene, []
         rows = len(self.array("time")) if "time" in self else scene.samples
@@ -293,8 +297,8 @@ class StoredRun:
         trajectory, facts = self.trajectory(), self.attributes
         if trajectory is None:
             return None
-        # The engine's report, as far as it is stored. A frozen reference has none and is a success;
-        # a sweep stores none, and the status takes its place.
+        # The engine's report, as far as it is stored. In a shipped file a reference has none, and
+        # is a success. A sweep stores none, and the status takes its place.
         is_reported = "engine_success" in self._row
         success = self.is_frozen if is_reported else self.status == "ok"
         success = bool(facts.get("engine_success", success))
@@ -351,9 +355,12 @@ class StoredScene:
 
     @functools.cached_property
     def changes(self) -> list[SceneChange] | None:
-        """Return the changes to this package's scene of the same name; None if there is none."""
-        known = shipped_scene(self.name)
-        return None if known is None else scene_changes(known, self.scene)
+        """Return the changes to this package's scene of the same name.
+
+        None is returned if this package has no scene of the name.
+        """
+        shipped = shipped_scene(self.name)
+        return None if shipped is None else scene_changes(shipped, self.scene)
 
     @property
     def label(self) -> str:
@@ -658,11 +665,11 @@ class Record:
     ----------
     kind : a key of `POINT_COLUMNS`, "modes" or "comparison".
     scene : its name.
-    name : the method, "lagrange/taylor"; of a bench followed by its fixed settings if they are not
-        the default ones.
+    name : the method, "lagrange/taylor". For a curve of a bench, settings that are constant along
+        it follow, if they are not the default ones.
     attributes : further values by name.
     arrays : (rows,) by name; `status` as codes of `solution.status.STATUSES`.
-    columns : descriptions of the arrays, scales first; only of groups of arrays.
+    columns : descriptions of the arrays, scales first; empty for points of curves and ladders.
     """
 
     kind: str
@@ -684,7 +691,7 @@ class Record:
 
     @property
     def messages(self) -> list[str]:
-        """Return a message for each row."""
+        """Return a message for each row; of a ladder of steps also for the omitted ones."""
         return [
             str(text) for text in self.attributes.get("messages", [""] * len(self.arrays["status"]))
         ]
@@ -730,11 +737,11 @@ def _point_records(stored: StoredTable) -> Iterator[Record]:
     }
     curves = [(row["scene"], row.get("curve", row["method_name"])) for row in rows]
     for scene, name in dict.fromkeys(curves):
-        places = [i for i, curve in enumerate(curves) if curve == (scene, name)]
-        if (statuses[places] == MISSING).any():
+        row_numbers = [i for i, curve in enumerate(curves) if curve == (scene, name)]
+        if (statuses[row_numbers] == MISSING).any():
             continue
-        known = rows[places[0]]
-        arrays = {column: values[places] for column, values in columns.items()}
+        known = rows[row_numbers[0]]
+        arrays = {column: values[row_numbers] for column, values in columns.items()}
         setting_kind = str(known.get("setting_kind", "step"))
         arrays["setting"] = arrays[setting_kind]
         # What the curve has as a whole stands in its first row; a number that is missing is NaN.
@@ -765,7 +772,8 @@ def _point_records(stored: StoredTable) -> Iterator[Record]:
 def write_records(path: Path, records: Sequence[Record]) -> None:
     """Write records of one kind into a file, which keeps those of other scenes.
 
-    The modes of a scene replace all earlier ones of it, a comparison those of the same name.
+    New modes of a scene replace all earlier ones of the scene. A new comparison replaces one of the
+    same scene and name.
 
     Parameters
     ----------

@@ -163,22 +163,23 @@ class RowLocation:
             os.fsync(file.fileno())
 
 
-def checksums(first: int, rows: Rows, row: np.dtype[np.void]) -> NDArray[np.uint32]:
+def checksums(first: int, rows: Rows, row_type: np.dtype[np.void]) -> NDArray[np.uint32]:
     """Return the CRC-32 of each row over its number and its columns, (rows,) uint32."""
     # The initial value is the number of the row, so that a row in the place of another is detected.
     sums = [(first + i) & 0xFFFFFFFF for i in range(len(rows["status"]))]
-    for name in row.names or ():
+    for name in row_type.names or ():
         if name == "crc32":
             continue
-        contents: Any = np.ascontiguousarray(rows[name], row[name].base).reshape(len(sums), -1)
+        values = np.ascontiguousarray(rows[name], row_type[name].base)
+        contents: Any = values.reshape(len(sums), -1)
         sums = [zlib.crc32(content, so_far) for content, so_far in zip(contents, sums, strict=True)]
     return np.array(sums, np.uint32)
 
 
-def blank_rows(count: int, row: np.dtype[np.void]) -> Rows:
+def blank_rows(count: int, row_type: np.dtype[np.void]) -> Rows:
     """Return blank rows: numbers are NaN or -1 (0 if unsigned), texts are empty."""
     blanks = {"f": np.nan, "i": -1, "u": 0, "S": b""}
-    kinds = {name: row[name] for name in row.names or ()}
+    kinds = {name: row_type[name] for name in row_type.names or ()}
     return {
         name: np.full((count, *kind.shape), blanks[kind.base.kind], kind.base)
         for name, kind in kinds.items()

@@ -26,12 +26,15 @@ _REPORTED = ("status", "message", "run_time_s")
 
 @dataclass(frozen=True)
 class RunOutcome:
-    """A run, or other rows of a study, that this call computed or tried to compute.
+    """The outcome of a run, or of other rows of a study.
+
+    They were computed by this call, could not be computed, or were stored before.
 
     Attributes
     ----------
     label, method : of the run.
-    status : of a run; "measured" for other rows; REFUSED if the method refused the scene.
+    status : of a run; "measured" for other rows. If nothing is stored, the failure: REFUSED if the
+        method refused the scene, "no_reference", or that of a `TaskEnd`.
     message : the reason of the status, if there is one.
     seconds : run time in s; NaN if nothing was timed.
     is_stored : whether there is a row; if not, the same call tries again.
@@ -58,7 +61,7 @@ def ignore_progress(_done: int, _total: int, _outcome: RunOutcome) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class Task(ABC):
-    """Consecutive rows of a table, computed at once by one process.
+    """Consecutive rows of a table, computed together by one process.
 
     Attributes
     ----------

@@ -224,7 +224,7 @@ class TableFile:
         Raises
         ------
         StoreError
-            If the file cannot be read, or what was laid out has changed since.
+            If the file cannot be read, or its tables are damaged.
         """
         self.path = path
         self.attributes: dict[str, Any] = {}
@@ -303,9 +303,9 @@ class TableFile:
 
 
 _opened: dict[tuple[Path, Path, tuple[int, ...]], TableFile] = {}
-_opening = threading.Lock()  # held while `_opened` is used
+_opened_lock = threading.Lock()  # held while `_opened` is used
 _MAX_OPENED = 4  # files whose tables are kept
-# Time after a write from which on a further write has another time stamp.
+# ns. A write that is later than the last one by more than this has another time stamp.
 _SETTLED_NS = 100_000_000
 
 
@@ -330,7 +330,7 @@ def opened_tables(path: Path, only: Collection[str] | None = None) -> TableFile:
         return TableFile(path, only)  # says what is wrong
     # The path as it is given is a part of the key, too: the tables' messages have it.
     stamp = (path, path.absolute(), (state.st_dev, state.st_ino, state.st_size, state.st_mtime_ns))
-    with _opening:
+    with _opened_lock:
         file = _opened.pop(stamp, None)
     if file is None:
         file = TableFile(path, only)
@@ -339,7 +339,7 @@ def opened_tables(path: Path, only: Collection[str] | None = None) -> TableFile:
     is_settled = time.time_ns() - state.st_mtime_ns > _SETTLED_NS
     with suppress(OSError):  # removed meanwhile
         is_settled = is_settled and path.stat().st_mtime_ns == state.st_mtime_ns
-        with _opening:
+        with _opened_lock:
             if is_settled:
                 _opened[stamp] = file
             while len(_opened) > _MAX_OPENED:
@@ -390,7 +390,7 @@ def _table(path: Path, group: str, stored: StoredGroup, inode: int) -> StoredTab
     return table
 
 
-# By group of a table, what it must have: computed columns, known columns, attributes.
+# What the table of each group must have: computed columns, known columns, attributes.
 _REQUIRED: Mapping[str, tuple[Collection[str], Collection[str], Collection[str]]] = {
     "": (("status", "crc32"), (), ()),
     RUNS: (

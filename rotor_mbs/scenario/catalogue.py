@@ -101,7 +101,7 @@ def find_scenes(arguments: Sequence[str], check: ValuesCheck | None = None) -> l
             paths += _files(argument)
         except InputError as error:
             problems += error.problems
-    seen: set[Path] = set()  # where the paths lead to
+    seen: set[Path] = set()  # files that were found, with links resolved
     by_name: dict[str, Path] = {}
     scenes = []
     shipped = {path.resolve(): name for name, path in _shipped().items()}
@@ -151,7 +151,8 @@ def _name_problem(
         return f"{clash}; allowed: different names"
     if not _NAME.fullmatch(name):
         return f"the file's name cannot name a scene; allowed: a name {_NAME_RULE}"
-    # A results file has one group for `paper` and the scenes in it.
+    # In a results file the group `paper` contains those of its scenes, `paper/fig05` and others, so
+    # that no scene can be named `paper`.
     is_folder = any(other.startswith(name + "/") for other in shipped)
     if name in RESERVED_GROUPS or is_folder:
         hint = ""
@@ -199,11 +200,14 @@ def shipped_scene(name: str) -> Scene | None:
 
 
 def changes_from_shipped(scene: Scene) -> list[SceneChange] | None:
-    """Return what differs from the shipped scene of the same name; None where there is none."""
+    """Return what differs from the shipped scene of the same name.
+
+    None is returned if no shipped scene has this name.
+    """
     from rotor_mbs.scenario.scene import scene_changes
 
-    known = shipped_scene(scene.name)
-    return None if known is None else scene_changes(known, scene)
+    shipped = shipped_scene(scene.name)
+    return None if shipped is None else scene_changes(shipped, scene)
 
 
 def scene_label(scene: Scene) -> str:

@@ -46,7 +46,7 @@ from rotor_mbs.studies.stored_references import frozen_solution, read_reference,
 # Short runs are repeated, so that the stored time is not that of a cold cache; long ones are not.
 _REPEATS = 5
 _REPEAT_BUDGET_S = 0.05
-_JUDGING_S = 1.0  # at least, to judge a run after the time limit was reached
+_JUDGING_S = 1.0  # s that are always left to judge a run, also after the time limit
 _FIXED_WORK = 3.0  # of building, judging and storing a run, see `work_of`
 
 
@@ -168,9 +168,10 @@ class BatchReport:
 
     @property
     def not_computed(self) -> list[RunOutcome]:
-        """Return the runs whose process died or could not start.
+        """Return the runs of which nothing is stored; the same call tries them again.
 
-        Nothing is stored of them; the same call tries them again.
+        Their method refused the scene, their process died or could not start, or their reference
+        was not computed.
         """
         return [run for run in self.computed if not run.is_stored]
 
@@ -187,7 +188,10 @@ def run_scenes(
     use_frozen: bool = True,
     on_progress: OnProgress = ignore_progress,
 ) -> BatchReport:
-    """Compute references and runs into a results file; what it has already is kept.
+    """Compute references and runs, and store them in a results file.
+
+    Rows that the file has already are kept. A requested row is computed again if its settings, its
+    versions or the numbers of its scene differ, and in the cases that `missing_runs` names.
 
     Parameters
     ----------
@@ -253,7 +257,7 @@ def missing_runs(
     Parameters
     ----------
     file : the results file, with a row for each run.
-    requests : the runs, of each scene the reference first.
+    requests : the runs; the reference of each scene comes before its other runs.
     timeout_s : time limit of a run (s).
 
     Returns
@@ -272,9 +276,10 @@ def missing_runs(
         place = file.place(run.label)
         row = place.read()
         status = STATUSES[row["status"][0]] if place.is_stored else ""
-        # The time limit that ended the stored run; NaN if none did. For a shipped reference it is a
-        # number only if reading it took too long. One whose own samples end early has NaN, and
-        # stays.
+        # The time limit that ended the stored run; NaN if none did. A run that ended timed_out is
+        # computed again unless this limit was at least as long as the present one. A shipped
+        # reference has a limit only if it took too long to read. A shipped one that was itself
+        # ended early has NaN, and is not read again: it would be as short.
         limit = row["time_limit_s"][0]
         is_short = not limit >= timeout_s
         if run.is_shipped:
@@ -397,7 +402,7 @@ def _judged(run: Solution, reference: Trajectory | None, end: float) -> tuple[So
 
 
 def _with_defects(samples: Trajectory, defects: Defects) -> Trajectory:
-    """Return the samples with the size of each interval's defect at its end.
+    """Return the samples with the size of the defect of the interval that ends at each of them.
 
     It is NaN at the first sample, and where the defect is not finite.
     """
@@ -415,7 +420,7 @@ def next_to_try(scene: Scene, method: str, settings: Mapping[str, object], statu
 
     Parameters
     ----------
-    scene : its sample interval is the coarsest step.
+    scene : the scene; steps of a ladder are at most its interval between samples.
     method, settings : of the run.
     status : of the run; only "inaccurate" gives a proposal.
     """

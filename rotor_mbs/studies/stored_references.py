@@ -53,7 +53,8 @@ def _shipped_by_hash(files: tuple[Path, ...]) -> dict[str, ShippedReference]:
     """Return the references in these files, by the hash of their scene."""
     by_hash: dict[str, ShippedReference] = {}
     for path in files:
-        # These alone: all of the table takes ten times as long, in every process that runs a scene.
+        # Three columns alone: to read the whole table takes ten times as long, and every process
+        # that runs a scene does it.
         columns = read_arrays(path, RUNS, ("scene_hash", "scene", "versions"))
         for digest, scene, made_with in zip(*map(np.ndarray.tolist, columns.values()), strict=True):
             frozen_with = json.loads(made_with)["frozen_with"]
@@ -62,9 +63,9 @@ def _shipped_by_hash(files: tuple[Path, ...]) -> dict[str, ShippedReference]:
 
 
 def shipped_versions(scene_hash: str) -> dict[str, str] | None:
-    """Return the `versions` of a row with the shipped reference of the scene with this hash.
+    """Return what a row with a shipped reference has as its `versions`.
 
-    None is returned where there is no such reference.
+    The reference is that of the scene with this hash. None is returned if there is none.
     """
     shipped = shipped_reference(scene_hash)
     if shipped is None:
@@ -107,6 +108,7 @@ def rebuilt_reference(scene: Scene, arrays: Mapping[str, NDArray[Any]]) -> Traje
     """
     from rotor_mbs.models.lagrange import samples
 
+    # An array that was not stored is NaN from the first sample on.
     known = {name: values for name, values in arrays.items() if not np.isnan(values[:1]).all()}
     moving = scene.moving_coordinates
     states = np.hstack([known["angles"][:, moving], known["rates"][:, moving]])
