@@ -182,7 +182,7 @@ def known_names() -> list[tuple[str, ...]]:
         ("angle and rate of a joint", "rotor.phi, rotor.w, pitch[1].phi, pitch[1].w"),
         ("array of angles, rotor first", ", ".join(VECTOR_NAMES["angle"])),
         ("array of rates, rotor first", ", ".join(VECTOR_NAMES["rate"])),
-        ("column of an array", "q[0], q[1], q(1), q[1,1], q_1: from 0, or from 1 without a 0"),
+        ("column of an array", "q[0], q[1], q(1), q[1,1], q_1: from 0; from 1 if none is 0"),
         ("load, with blade and axis, or an array", ", ".join(load.name for load in LOADS)),
         ("root load of OpenFAST", "RootFxb1, RootMyc2, ..."),
         ("modes: rotor speed, without a time", ", ".join(SPEED_NAMES)),

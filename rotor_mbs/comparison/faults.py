@@ -226,7 +226,7 @@ def _wrong_clock(judged: JudgedDefects, group: NDArray[np.int64]) -> str:
     period = f"from t = {time[group[0]]:.6g} to {time[group[-1] + 1]:.6g} s"
     lag = f"{abs(float(np.median(lags))):.2g} s"
     intervals = f"each of {len(group)} intervals {period}"
-    return f"the motion is {clock} by {lag} more in {intervals}: steps, or times"
+    return f"the motion is {clock} by {lag} more in {intervals}: wrong steps, or times"
 
 
 def _change_of_state(judged: JudgedDefects, row: int) -> str:

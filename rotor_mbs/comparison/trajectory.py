@@ -190,7 +190,8 @@ def compare_with_reference(
         cause = "" if likely else ": an integrator's own error, or a cause that was not found"
         notes.append(f"within {tolerance:g} rad per interval, but {times}{cause}")
     elif status == "ok" and likely:
-        notes.append(f"within {tolerance:g} rad per interval, but correlated")
+        within = f"defects are within {tolerance:g} rad per interval"
+        notes.append(f"{within}, but correlated from interval to interval")
 
     channels, expected, compared = errors.channels, rows.expected, rows.compared
     if loads.channels:

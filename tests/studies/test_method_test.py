@@ -398,8 +398,8 @@ def test_a_motion_that_falls_behind_in_many_intervals_is_late() -> None:
     defects = interval_defects(scene, time, *motion)
     (text,) = faults_in_time(judged_defects(scene, defects, 1e-6))
     assert text == (
-        "the motion is late by 0.001 s more in each of 10 intervals from t = 0 to 0.56 s: steps, "
-        "or times"
+        "the motion is late by 0.001 s more in each of 10 intervals from t = 0 to 0.56 s: "
+        "wrong steps, or times"
     )
 
 
