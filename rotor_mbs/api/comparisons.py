@@ -55,8 +55,9 @@ def compare(
     ----------
     data : a file, or arrays by name; also an `xarray.Dataset` or a `pandas.DataFrame`. A trajectory
         has `time` (n,) s, `angles` and `rates` (n, 1 + blades) rad and rad/s, or single columns
-        such as `rotor`, `pitch_1_deg`; angles or rates may be missing. Loads have their names (N,
-        N m), see docs/compare.md. Modes have `speed` (m,) rad/s, `frequencies` (m, modes) rad/s.
+        such as `rotor`, `pitch_1_deg`; angles or rates may be missing. Columns of loads (N, N m)
+        have the names in docs/compare.md. Modes have `speed` (m,) rad/s, `frequencies` (m, modes)
+        rad/s.
     scene : a Scene, the name of a shipped scene, or a TOML file.
     columns : a mapping file, or a mapping with the same keys: column, unit, sign, offset of each
         channel, and whether it is wrapped. By default columns are identified by name, see
@@ -108,15 +109,16 @@ def open_comparisons(path: Path) -> DataComparison | dict[str, DataComparison]:
 
     Raises StoreError if the file has none or cannot be read.
     """
-    found = {}
+    comparisons = {}
     for record in read_records(path, COMPARISON):
         with reading(path):
-            found[f"{record.scene}/{record.name}"] = DataComparison(verdict_of(record), record)
-    if not found:
+            label = f"{record.scene}/{record.name}"
+            comparisons[label] = DataComparison(verdict_of(record), record)
+    if not comparisons:
         raise StoreError(
             f"{path}: no comparison in it; allowed: a file that rotor-mbs compare has written"
         )
-    return found if len(found) > 1 else next(iter(found.values()))
+    return comparisons if len(comparisons) > 1 else next(iter(comparisons.values()))
 
 
 @dataclass(repr=False)
@@ -141,9 +143,10 @@ class DataComparison:
     def table(self) -> Any:
         """Return a pandas DataFrame with a row per channel.
 
-        It has the errors up to the horizon and at all in the channel's `unit`, what of the largest
-        defect the digits of the data do not explain, and what they do, in its `defect_unit`, and
-        up to which time (s) the errors stay within each of several levels.
+        Columns: the largest error up to the horizon and over all rows, in `unit`; the largest
+        defect beyond what the digits of the data explain (`defect`), and what they explain
+        (`floor`), in `defect_unit`; and for each of several levels the time (s) up to which the
+        errors stay within it.
         """
         rows = []
         for channel in self.verdict.channels:

@@ -405,14 +405,14 @@ def modes(arguments: argparse.Namespace) -> int:
 
 
 def compare(arguments: argparse.Namespace) -> int:
-    """Compare data of another program with a scene's reference.
+    """Compare data of another program with a scene, see `api.comparisons.compare`.
 
     A table is printed; a page and a results file with the numbers are written.
 
     Parameters
     ----------
-    arguments : `data`, `scene`, `columns` (mapping file), `tolerance` (rad), `timeout` (s),
-        `output` (folder), and `json`, which prints the verdict as JSON.
+    arguments : `data`, `scene`, `columns` (mapping file), `tolerance` (rad; relative for loads and
+        modes), `timeout` (s), `output` (folder), and `json`, which prints the verdict as JSON.
 
     Returns
     -------
@@ -430,20 +430,20 @@ def compare(arguments: argparse.Namespace) -> int:
 
     stored = arguments.output / "comparison.h5"
     may_extend(stored, COMPARISON)  # before anything is computed
-    found = compare_data(
+    comparison = compare_data(
         arguments.data,
         only_scene(arguments.scene),
         columns=arguments.columns,
         tolerance=arguments.tolerance,
         timeout=arguments.timeout,
     )
-    page = found.to_html(arguments.output)
-    found.save(stored)
+    page = comparison.to_html(arguments.output)
+    comparison.save(stored)
     if arguments.json:
-        print_json(as_dictionary(found.verdict), indent=1)
+        print_json(as_dictionary(comparison.verdict), indent=1)
     else:
-        print(found, f"page: {page}, numbers: {stored}", sep="\n")
-    return 0 if found.agrees else 1
+        print(comparison, f"page: {page}, numbers: {stored}", sep="\n")
+    return 0 if comparison.agrees else 1
 
 
 def export(arguments: argparse.Namespace) -> int:

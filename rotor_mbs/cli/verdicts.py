@@ -23,8 +23,8 @@ from rotor_mbs.runs.read import is_sweep
 from rotor_mbs.scenario.accuracy_bounds import read_bounds, shipped_bounds
 from rotor_mbs.studies import check as study
 
-# Largest number of annotations, of which GitHub shows ten of a step and drops the others silently;
-# and of lines about margins that have shrunk.
+# GitHub shows ten annotations of a step and drops the others silently. As many lines report margins
+# that have shrunk.
 WORST = 10
 
 
@@ -116,14 +116,15 @@ def report_lines(
     Parameters
     ----------
     verdicts : checks, in the order in which they are reported.
-    annotated : failures that GitHub shows as annotations; in its log these lines stand for them.
+    annotated : failures that are printed as annotations of GitHub in place of lines.
     verbose : whether passed checks have lines, too.
 
     Returns
     -------
     list of str
-        A line per failure, or per check; of failures `against` an earlier file only the ten worst,
-        as one changed default setting shrinks hundreds of margins; then the annotations.
+        A line per failure, with `verbose` per check; then the annotations. Without `verbose`,
+        failures `against` an earlier file are cut to the ten worst, because one changed default
+        setting shrinks hundreds of margins.
     """
     shrunk = worst_first(
         [verdict for verdict in verdicts if verdict.name == study.AGAINST and not verdict.passed]

@@ -20,7 +20,7 @@ from rotor_mbs.comparison.faults import faults_in_time
 
 _SAME_START = 1e-3  # rad, rad/s: data that differ more at the start are no run of the scene
 _LONG = 2.0  # times the scene's duration: of longer data causes are always searched for
-_NOT_COMMON = 3.0  # standard deviations of the correlation of independent numbers
+_CORRELATED = 3.0  # times the standard deviation of the correlation of independent numbers
 
 
 def likely_causes(search: TrajectorySearch, judged: JudgedDefects | None) -> list[str]:
@@ -28,7 +28,8 @@ def likely_causes(search: TrajectorySearch, judged: JudgedDefects | None) -> lis
 
     Mistakes in columns and times come first; then another model, parameters, or faults at a time;
     then scatter, or a factor of a channel. Data that start in another state are compared with other
-    models last, as only one of their columns may be wrong.
+    models last, because the reason may be a mistake in one column. Only scenes of the catalogue
+    that have this start are tried before.
 
     Parameters
     ----------
@@ -69,9 +70,9 @@ def likely_causes(search: TrajectorySearch, judged: JudgedDefects | None) -> lis
 
 
 def _other_models_or_faults(search: TrajectorySearch, judged: JudgedDefects) -> list[str]:
-    """Search for another model, parameters or a clock, else for faults at a time."""
-    models = DefectSearch(judged, QUICK_SEARCH).explanations()
-    return models + clock_mistakes(search) or faults_in_time(judged)
+    """Search for other models, parameters and mistakes in the times, else for faults at a time."""
+    texts = DefectSearch(judged, QUICK_SEARCH).explanations() + clock_mistakes(search)
+    return texts or faults_in_time(judged)
 
 
 def _scatter(search: TrajectorySearch, data: ForeignData) -> list[str]:
@@ -97,16 +98,16 @@ def _scatter(search: TrajectorySearch, data: ForeignData) -> list[str]:
     if not is_wrong.any() or not ((sizes > 0.0) & (sizes < math.inf)).all():
         return []
     # If only every second row is wrong, neighbours are uncorrelated: rows two apart count, too.
-    correlations = []
+    products = []
     for lag in (1, 2):
-        correlations.append(np.abs((centred[lag:] * centred[:-lag]).mean(axis=0)))
-    common = np.max(correlations, axis=0) / sizes
+        products.append(np.abs((centred[lag:] * centred[:-lag]).mean(axis=0)))
+    correlation = np.max(products, axis=0) / sizes
     # Scatter is as large in the second half as in the first; an error of the motion grows.
     half = len(data.time) // 2
     early = (centred[:half] ** 2).mean(axis=0)
     late = (centred[half:] ** 2).mean(axis=0)
-    is_common = (common > _NOT_COMMON / math.sqrt(len(errors))).any()
-    if is_common or (late > 2.0 * early).any() or (early > 2.0 * late).any():
+    is_correlated = (correlation > _CORRELATED / math.sqrt(len(errors))).any()
+    if is_correlated or (late > 2.0 * early).any() or (early > 2.0 * late).any():
         return []
     deviation = math.sqrt(float(sizes.max()))
     return [f"scatter from row to row, standard deviation {deviation:.1e}"]

@@ -19,8 +19,8 @@ from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.quantities import LOADS
 
 TIME, SPEED = "time", "speed"
-# Names without digits, blanks and marks, as `known_names` lists them; a name of a rate is one of
-# an angle with a word of RATE_WORDS behind it, or d before it.
+# Names without digits, blanks and marks, as `known_names` lists them. The name of a rate is that of
+# its angle with a word of RATE_WORDS behind it, or d before it.
 TIME_NAMES = ("time", "t", "times", "zeit")
 ROTOR_NAMES = (
     "rotor", "rotorangle", "rotorposition", "rot", "azimuth", "rotorazimuth", "azim", "psi", "phi",
@@ -51,9 +51,10 @@ FREQUENCY_NAMES = {
     ),
 }  # fmt: skip
 LOAD_NAMES = tuple(load.name.replace("_", " ") for load in LOADS)
-# By the frame in which a scene's loads have them, the other frames in which data may have them.
-# blade pitches, coned is the blade's at zero pitch, rotor turns with y along the shaft and z across
-# it (of a blade: at its azimuth), shaft is the base turned by the tilt.
+# For the frame of a scene's loads: the other frames that the loads of data may have.
+# The frame "blade" turns with the pitch; "coned" is the blade's at zero pitch; "rotor" turns with
+# the rotor, y along the shaft and z across it (for a blade at its azimuth); "shaft" is the base
+# frame turned by the tilt.
 FRAMES = {"blade": ("coned", "rotor", "shaft", "base"), "base": ("shaft", "rotor")}
 LOAD_FRAMES = ("blade", *FRAMES["blade"])
 _FRAME_ENDINGS = [[frame, "frame"] for frame in LOAD_FRAMES]
@@ -85,7 +86,7 @@ class Channel:
     column : of the matrix of angles, then rates, then loads; of the damped, then the undamped
         frequencies; -1 for time and speed.
     frame : of a load, where it is not the scene's.
-    sign : of the column's numbers, where its name has a convention.
+    sign : -1 for a name of another program, such as OpenFAST's, that means the opposite sign.
     """
 
     name: str
@@ -291,8 +292,8 @@ def channel_from_name(
     Parameters
     ----------
     name : of the column, "rotor_deg", or of an array's column, "q[0]"; der(x) is the rate of x.
-    vector : how many columns its array has, 0 where it is none: `q[0]` is the rotor where there is
-        one per coordinate.
+    vector : number of columns of its array, 0 for a column of no array. `q[0]` is the rotor if the
+        array has a column for each coordinate.
     known : `channels` or `mode_channels`.
     indices : see `Place`; by default the numbers in the name, from 0 where they are in brackets.
     """
@@ -325,7 +326,7 @@ def names_a_channel(name: str, known: Sequence[Channel]) -> bool:
 def arrays_of_other_length(
     names: Sequence[str], known: Sequence[Channel], kind: str = ""
 ) -> dict[str, str]:
-    """Return columns of an array of channels that has more or fewer columns than channels.
+    """Find arrays of angles or rates whose number of columns is not that of the coordinates.
 
     Parameters
     ----------
@@ -336,7 +337,7 @@ def arrays_of_other_length(
     Returns
     -------
     dict of str
-        By name of the column the numbers of columns and of coordinates, in words.
+        For each column of such an array, by name, both numbers in words.
     """
     reasons: dict[str, str] = {}
     if known[0].name == SPEED:
@@ -383,7 +384,7 @@ def _array_name(name: str) -> str:
 def _channel_of_path(
     name: str, vector: int, known: Sequence[Channel], indices: Sequence[int] | None
 ) -> Channel | None:
-    """Return the channel of a whole name, of which no folders are left out; None if unknown.
+    """Return the channel of a name that is taken whole, with its folders; None if unknown.
 
     Parameters
     ----------
@@ -424,7 +425,8 @@ def _channel_of_path(
     channel = _angle_or_rate(letters, numbers, known)
     if channel is None or entry is None:
         return channel
-    # Several rotors are the azimuths of blades; more pitches than blades may have the rotor first.
+    # An array of several rotor angles has the azimuths of the blades. An array of more pitches than
+    # blades may begin with the rotor.
     blades = sum(other.kind == "angle" for other in known) - 1
     allowed = 1 if channel.name.startswith("rotor") else blades
     return (

@@ -63,8 +63,8 @@ class DataTable:
     columns : by name, in the order of the file.
     left_out : by name what else is in the file.
     program : that wrote the file, as its head says: "openfast", or "".
-    headers : for each column that was renamed, as an earlier column has its name: the name in the
-        file.
+    headers : name in the file of each column that was renamed because an earlier one has the same
+        name.
     """
 
     source: str
@@ -156,8 +156,8 @@ def table_of(
 
     An array of two dimensions (n, k) becomes the columns `name[0]` ... `name[k-1]`, one of three
     (n, j, k) the columns `name[0,0]` ... `name[j-1,k-1]`. An array (k, n) beside others of length n
-    is transposed, as MATLAB's arrays are where HDF5 stores them. Values that are not numbers,
-    single numbers, and arrays of more dimensions are listed in `left_out`.
+    is transposed: arrays of MATLAB have this form in HDF5. Values that are not numbers, single
+    numbers, and arrays of more dimensions are listed in `left_out`.
 
     Parameters
     ----------
@@ -193,7 +193,7 @@ def table_of(
             reason = f"an array of {shape}" if squeezed.ndim or not squeezed.size else "one number"
             left_out[name] = LeftOut(reason)
             del numeric[name]
-    rows = 0  # of the columns, as the arrays of one dimension have them
+    rows = 0  # largest length of the arrays of one dimension
     for values in numeric.values():
         if values.ndim == 1:
             rows = max(rows, values.size)
@@ -314,8 +314,8 @@ def _shown_value(row: int, value: object) -> str:
 def split_bracketed_unit(name: str) -> tuple[str, str]:
     """Return name and unit of "rotor [deg]", "rotor / deg" or "rotor in deg"; "" for no unit.
 
-    Numbers in brackets are indices, and a text in round brackets directly behind a word that is no
-    unit is the argument of a function: "q[1,1]" and "der(phi)" have no unit.
+    Numbers in brackets are indices. Round brackets directly behind a word are those of a function
+    if the word is "der" or the text in them is no unit: "q[1,1]" and "der(phi)" have no unit.
 
     Parameters
     ----------
@@ -364,7 +364,7 @@ def _bracketed(text: str) -> tuple[int, str] | None:
 
 
 def _behind_stroke(text: str) -> tuple[int, str] | None:
-    """Return where "/ unit" begins at the end of a name, blanks before the stroke, and the unit."""
+    """Return where " / unit" or " /unit" begins at the end of a name, and the unit."""
     words = text.rsplit(maxsplit=2)
     if len(words) == 3 and words[1] == "/":
         return len(words[0]), words[2]

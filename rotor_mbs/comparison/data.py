@@ -1,7 +1,7 @@
 """Load data of a scene in SI units from files or arrays, with the rounding of each number.
 
-Data that cannot be compared are refused here: not finite, of different lengths, times that do not
-increase.
+Data that cannot be compared are refused here: numbers that are not finite, columns of different
+lengths, rows that contradict each other.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.trajectory import Array
 
 _FEW_DIGITS, _SURE_DIGITS, _ALL_DIGITS = 9, 14, 17
-_MAX_WRITTEN = 20_000  # numbers that are written with some digits, evenly chosen: 1 us each
-_ROUNDED_SINCE = 2.0 * 2.0**-52  # relative: what a later factor of units changes in a number
+_MAX_WRITTEN = 20_000  # numbers of a column, evenly chosen, that are formatted as text: 1 us each
+_ROUNDED_SINCE = 2.0 * 2.0**-52  # relative error of a conversion of units after the rounding
 _SINGLE_DIGITS = 8  # as many as single precision has
 _SINGLE = 2.0**-24  # its relative rounding error
 _MAX_EXCEPTIONS = 0.05  # of the numbers
@@ -55,9 +55,9 @@ class ForeignData:
     wrapped : for each channel, whether whole turns are missing from it.
     precision : "4 decimals: rounding error 5e-05", or a number of digits in this form; "" if the
         numbers have hardly any rounding.
-    time_precision : the same of the times, "" if that of the numbers matters more.
+    time_precision : the same of the times; "" also if their intervals are equal, but for a few.
     notes : what was done to the rows.
-    omitted : names of channels that are not to be missed.
+    omitted : names of channels that the mapping omits: data without them are complete.
     restricted_to : names of the channels to which the mapping restricts the comparison; empty where
         it does not.
     is_modes : whether it is a table of modes.
@@ -151,7 +151,7 @@ def load_data(
     return data_of_table(table, scene, mapping)
 
 
-@np.errstate(all="ignore")  # data may be of any size
+@np.errstate(all="ignore")  # numbers of data may be so large that they overflow
 def data_of_table(
     table: DataTable, scene: Scene, mapping: DataMapping | None = None
 ) -> ForeignData:
@@ -222,7 +222,7 @@ def data_of_table(
 
 
 def _factor(channel: Channel, source: ColumnMapping) -> float:
-    """Return the factor of a column's unit, which is known to be one of its channel's."""
+    """Return the factor to the SI unit from a column's unit, which fits the channel."""
     return unit_factor(source.unit, channel.kind) or 1.0
 
 
@@ -367,8 +367,8 @@ def rounding_of_printed(
         exponents = np.floor(np.log10(np.where(sizes > 0.0, sizes, 1.0)))
         units = 0.5 * 10.0 ** (exponents + 1 - digits)
         last = np.maximum(last, np.where(sizes > 0.0, units, 0.0))
-    # Numbers of single precision may seem to have 16 digits, too: doubles from 0.5 to 1, which have
-    # wider gaps than numbers of 16 digits, all do.
+    # Numbers of single precision may also seem to have 16 digits. All doubles from 0.5 to 1 do: the
+    # gaps between them are wider than those between numbers of 16 digits.
     with np.errstate(over="ignore"):  # of what is larger than single precision can be
         single = np.asarray(judged, np.float32).astype(float)
     if np.array_equal(single, judged):
@@ -418,7 +418,8 @@ def _time_precision(time: Array, rounding: Array, *, is_equidistant: bool) -> st
     Parameters
     ----------
     time, rounding : (n,) as they were written, in the unit of the file.
-    is_equidistant : whether the intervals are equal; then the digits of the times do not matter.
+    is_equidistant : whether the intervals are equal, or equal but for a few; then the digits of the
+        times do not matter.
     """
     if is_equidistant:
         return ""

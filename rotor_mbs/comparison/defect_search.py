@@ -1,7 +1,7 @@
 """Other scenes, equations and parameters that explain the defects of data.
 
 No motion is integrated from the start: each hypothesis is compared with the data's own states,
-interval by interval. It explains the defects if what it leaves of them would agree.
+interval by interval. It explains the defects if it leaves nearly none, or what is tolerated.
 """
 
 from __future__ import annotations
@@ -29,27 +29,28 @@ from rotor_mbs.models.lagrange.defects import FIT_ROWS, explicit_steps, quick_en
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.trajectory import Array
 
-# Shares of the largest defect that an explanation may leave, for the other program's own error and
-# that of the quick steps. The second one holds as long as what is left is within the tolerance.
+# Shares of the largest defect that an explanation may leave, because the other program and the
+# quick steps have errors of their own. The second share holds if what is left is within the
+# tolerance.
 _LEFT, _LEFT_OF_SMALL = 1e-3, 0.15
 # The same share by the number of fitted parameters.
 _LEFT_OF_FITTED = {1: 0.02, 2: 2e-3, 3: 2e-3}
 _ALIKE = 3.0  # times what the best explanation leaves
 _ALIKE_IN_ROUNDING = 1.05
-_QUICK = 3e-5  # relative error of a change of the model by quick steps
+_QUICK = 3e-5  # relative error of the effect of another model, if computed by quick steps
 # Factor of the number of steps, so that this error holds also where the mass matrix is nearly
 # singular; and the number of steps to which the factor leads at most, to save time.
 _MOST_FINE, _FINE_STEPS = 8, 32
-_PERHAPS = 0.2  # share of the defects that a model leaves at most, by coarse steps, to be tried
-_OF_RESCALED = (
-    0.3  # times what a model leaves: the most that a better multiple of its effect leaves
-)
+# A model that leaves a larger share of the defects by coarse steps is not tried by fine ones.
+_PERHAPS = 0.2
+# A multiple of a model's effect explains far more if it leaves less than this share of what the
+# model leaves.
+_OF_RESCALED = 0.3
 _LEFT_OF_SETS = 0.1  # share left by the projections on several parameters, before they are fitted
 _FAR_BETTER = 0.1  # times what a cheaper explanation leaves
 _SIGNIFICANT = 8.0  # standard deviations of an estimate
-_CERTAIN = (
-    10.0  # times what a textbook mistake leaves: others leave more if it is certainly the cause
-)
+# A textbook mistake is certainly the cause if all others leave more than this many times as much.
+_CERTAIN = 10.0
 _MAX_CHANGE = 0.6  # a share, or rad: what is further off is another scene
 _MAX_FITTED = 8  # sets of parameters, those whose projections leave least
 _MAX_PARAMETERS = 3  # at once
@@ -119,7 +120,9 @@ class DefectSearch:
         return not self._largest
 
     def explanations(self) -> list[str]:
-        """Search for other scenes and equations, else for parameters that are off.
+        """Search for other scenes and equations, and for parameters that are off.
+
+        Parameters are tried if nothing else explains the defects to the error of the quick steps.
 
         Returns
         -------
@@ -198,7 +201,10 @@ class DefectSearch:
                 yield hypothesis
 
     def _first_row(self) -> Array:
-        """Return the first state of the data, (2 (1 + blades),), the scene's where it is fixed."""
+        """Return the first state of the data, with the scene's pitches where they have no inertia.
+
+        Its shape is (2 (1 + blades),).
+        """
         scene = self._scene
         first = np.array([*scene.initial_angles, *scene.initial_rates])
         count = len(scene.initial_angles)
@@ -231,8 +237,8 @@ class DefectSearch:
                     model.scene, *intervals, steps * self._steps, model.accelerations()
                 )
             else:
-                # The method's own error is the difference from fine steps, which replace the
-                # scene's own ends: then the errors of the quick steps do not cancel.
+                # The change below is then the method's own error, by comparison with fine steps of
+                # the closed form. Their errors do not cancel in it: the method takes other steps.
                 ends = quick_ends(model.scene, *intervals, model.steps, step=model.method)
         except RotorError:
             return np.full_like(self._values, np.inf)
@@ -272,8 +278,8 @@ class DefectSearch:
         """Return whether a multiple of a model's effect explains the defects far better than it.
 
         Then the data have a mistake of this kind but of another size: a hub whose inertia is too
-        small is not one without inertia. What another program's own error leaves has no such
-        multiple.
+        small is not one without inertia. If the model is right and the rest is the other program's
+        own error, no multiple is far better.
         """
         if explanation.left <= 10.0 * _QUICK:
             return False
@@ -327,8 +333,8 @@ class DefectSearch:
                 hypothesis = self._fit([candidates[i] for i in places])
                 if hypothesis is not None:
                     fitted.append(hypothesis)
-            # Of a textbook mistake the size is known; numbers that are fitted explain a part of
-            # anything, and several of them much of it.
+            # Fitted numbers explain a part of any defects, and several of them a large part: they
+            # are allowed to leave less than a textbook mistake, whose size is known.
             allowed = min(self._allowed, _LEFT_OF_FITTED[count] * self._largest)
             left = functools.partial(self._left_at_most, allowed=allowed)
             explained = list(explanations(fitted, left))
@@ -385,7 +391,7 @@ class DefectSearch:
         if not np.isfinite(weighted).all():
             return None
         deviation = self._deviations(weighted, slopes)
-        # The quick steps have errors of their own, which are no change either.
+        # A change that is not larger than the error of the quick steps is not significant either.
         deviation = np.maximum(deviation, _QUICK * np.abs(change))
         if (np.abs(change) < _SIGNIFICANT * deviation).any():
             return None
@@ -475,7 +481,7 @@ def _has_kink(judged: JudgedDefects) -> NDArray[np.bool_]:
 
 
 def _tried_windows(judged: JudgedDefects, rows: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return the first rows of windows without a kink of a load, at some of given intervals.
+    """Choose windows of rows without a kink of a load, which begin at given intervals.
 
     Parameters
     ----------
@@ -499,7 +505,7 @@ def _tried_windows(judged: JudgedDefects, rows: NDArray[np.int64]) -> NDArray[np
 def _window_residuals(
     judged: JudgedDefects, windows: NDArray[np.int64]
 ) -> tuple[Array, Array, Array]:
-    """Compute the part of the angles in windows of rows that no motion of the scene explains.
+    """Compute the residuals of the angles in each window after a fit of the scene's motion.
 
     It is for data whose rates are fitted to their angles. The fitted rates are those with which the
     closed form fits best, so that defects of single intervals show only a part of a mistake.

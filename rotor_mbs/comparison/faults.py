@@ -21,21 +21,24 @@ from rotor_mbs.models.lagrange.parameters import rotor_form
 from rotor_mbs.scenario.time_table import torque_place
 from rotor_mbs.solution.trajectory import Array
 
-UNKNOWN_FAULT = "a fault"  # begin of the text of a fault whose place alone is known
+UNKNOWN_FAULT = "a fault"  # begins the text of a fault of which only the time is known
 _MAX_NAMED = 6  # faults
 _MAX_STEPS = 512  # of Runge and Kutta in an interval
 _STANDS_OUT = 30.0  # times the median of the defects
 _FAINT = 0.02  # of the largest defect: smaller ones are not reported beside it
 _EVERYWHERE = 0.6  # of the intervals
-# Share of the other intervals, and the share of the largest defect that their defects may reach.
+# In this share of the other intervals, defects are at most this share of the largest defect.
 _MOST, _OF_OTHERS = 0.9, 1e-3
-_EDGE = 0.1  # of the faulty intervals' median: largest defect of right intervals beside them
+_EDGE = 0.1  # share of the faulty intervals' median that the median beside them may reach
 _GAP = 6  # intervals: faults that are nearer to each other are one
 _AT_END = 3  # intervals
-_OF_ENDS = 1e-3  # of the largest: above this, usual defects and those at the ends have one cause
+# Share of the largest defect: if usual defects are larger, those at the ends have the same cause.
+_OF_ENDS = 1e-3
 _PARALLEL = 0.995  # cosine
 _NEARLY = 0.05
-_LEFT_OF_LOADS = 0.15  # of the defects: a load changes within an interval, and the rotor turns on
+# Share of the defects that a constant load in each interval may leave: the actual load may change
+# within the interval, and its effect does as the rotor turns.
+_LEFT_OF_LOADS = 0.15
 _OF_COORDINATE = 0.1  # of a coordinate's defects: a load with a smaller share does not act on it
 _OF_USUAL = 10.0  # times a channel's median: smaller defects of it do not count
 _MIN_CLOCK = 3  # intervals that are late or early alike
@@ -67,7 +70,7 @@ def faults_in_time(judged: JudgedDefects) -> list[str]:
     # others.
     if not len(wrong) or len(wrong) > _EVERYWHERE * len(excess):
         return []
-    # Defects that decrease gradually beside the largest ones are no fault at a time either: that
+    # Defects that decrease gradually beside the largest ones are no fault at a time either: a fault
     # has edges.
     edges = np.concatenate([wrong - 1, wrong + 1])
     is_interval = (edges >= 0) & (edges < len(excess))
@@ -90,8 +93,8 @@ def faults_in_time(judged: JudgedDefects) -> list[str]:
     texts = []
     for group in groups[:_MAX_NAMED]:
         texts += _faults_of(judged, group)
-    # A period without a pattern is no cause where the other intervals have errors, too, though
-    # within the tolerance: those of an integrator are larger while the motion is fast.
+    # The errors of an integrator are larger while the motion is fast. If the other intervals have
+    # errors, too, even within the tolerance, a period without a pattern is not named as a cause.
     if of_others > _OF_OTHERS * judged.largest:
         texts = [text for text in texts if not text.startswith(UNKNOWN_FAULT)]
     if len(groups) > _MAX_NAMED:
@@ -111,8 +114,8 @@ def _faults_of(judged: JudgedDefects, group: NDArray[np.int64]) -> list[str]:
     Returns
     -------
     list of str
-        The faults in words; where no pattern is recognized, when there is a fault, and in which
-        coordinate it is largest.
+        The faults in words; without a recognized pattern, the period of the fault and the
+        coordinate in which it is largest.
     """
     text = _fault(judged, group)
     if text:
@@ -168,8 +171,8 @@ def _label(judged: JudgedDefects, place: int) -> str:
 def _wrong_row(judged: JudgedDefects, group: NDArray[np.int64]) -> str:
     """Describe a row that is repeated, stuck, wrong or at a wrong time; "" where it is none.
 
-    The defect is the closed form less the data: it has the direction of the motion where the data
-    are behind it.
+    The defect is the closed form less the data: it has the direction of the motion if the data lag
+    behind.
 
     Parameters
     ----------
@@ -187,9 +190,9 @@ def _wrong_row(judged: JudgedDefects, group: NDArray[np.int64]) -> str:
     along = max(_cosine(values[0], rate), _cosine(values[0], motion), key=abs)
     if len(group) == 1 and abs(along) >= _PARALLEL:
         clock = "late" if along > 0.0 else "early"
-        row = "repeated" if along > 0.0 else "omitted and the others renumbered"
+        event = "repeated" if along > 0.0 else "omitted and the others renumbered"
         at = f"at t = {defects.time[last + 1]:.6g} s"
-        return f"a row {row}, or times {clock} by less than an interval, {at}"
+        return f"a row {event}, or times {clock} by less than an interval, {at}"
     if len(group) == 2 and last == first + 1:
         # The second interval starts at the wrong row, and ends at a right one: its defect is the
         # row's error, carried over the interval, with the opposite sign.
@@ -230,7 +233,7 @@ def _wrong_clock(judged: JudgedDefects, group: NDArray[np.int64]) -> str:
 
 
 def _change_of_state(judged: JudgedDefects, row: int) -> str:
-    """Describe a single faulty interval, by its number, that no load explains."""
+    """Describe the fault of a single interval, number `row`, that no load explains."""
     half = len(judged.defects.moving)
     start, end = (float(time) for time in judged.defects.time[row : row + 2])
     # If the rates jump within the interval, the angles have changed by the jump times the rest of

@@ -1,8 +1,8 @@
 """Read a file of another program as columns, in a process of its own with limits.
 
 What a file holds is decided by others: it may be damaged, or made to harm. Every format is read in
-that process, so that a file that ends it, keeps it busy or fills its memory is an error of one line
-here.
+another process. If reading ends that process, takes too long or fills its memory, the caller gets
+an error of one line.
 """
 
 from __future__ import annotations

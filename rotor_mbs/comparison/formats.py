@@ -1,7 +1,9 @@
-"""Which library reads which format: the work of the process that `comparison.files` starts.
+"""Read a file of any format, in the process that `comparison.files` starts.
 
-pandas reads text and JSON, pymatreader and SciPy MAT files, SciPy netCDF-3, xarray decodes what the
-CF conventions say of arrays in netCDF and HDF5. Ours are the headers of OpenFAST and Exudyn.
+The libraries: pandas for text and for tables in JSON, NumPy for .npz, pymatreader and SciPy for MAT
+files, SciPy for netCDF-3, h5py for HDF5 and netCDF-4, openfast_io for .outb. xarray unpacks arrays
+of netCDF and HDF5 as the CF conventions say. The headers of text are read here, also those of
+OpenFAST and Exudyn.
 
 A file may be damaged, or made to harm: what it claims to hold is bounded before it is read, and the
 process has limits of memory and time for what no check foresees. No regular expression here takes
@@ -76,7 +78,7 @@ _EXUDYN_KINDS = (
 _DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+(?:[eE][+-]?\d+)?")
 _FORTRAN = re.compile(r"(?<=[\d.])[dD](?=[+-]?\d)")  # 1.5D-03
 _FORTRAN_3_DIGITS = re.compile(r"(?<=[\d.])(?=[+-]\d{3}$)")  # 0.123456-101: no room for the E
-# What programs write where they have no number; a row with it may be the first one.
+# What programs write where they have no number, also in the first row of numbers.
 _MISSING = re.compile(r"\*+|-+|\?|#?n/?a!?|null|none|missing|nil", re.IGNORECASE)
 _MAX_SEARCHED = 200  # lines that are searched for a header where some columns are texts
 
@@ -129,7 +131,7 @@ def read_in_worker(arguments: tuple[Path, str, str]) -> DataTable:
 
 
 def _line(exc: BaseException) -> str:
-    """Return the first line of an exception's text."""
+    """Return the first line of an exception's text, cut to 200 characters, or else its type."""
     lines = str(exc).splitlines()
     return lines[0][:200] if lines else type(exc).__name__
 
@@ -158,29 +160,30 @@ def read_columns(path: Path, group: str, scene: str) -> DataTable:
         are not caught here.
     """
     with path.open("rb") as file:
-        head = file.read(1024)
+        begin = file.read(1024)
     source = str(path)
-    # The version and the order of bytes stand at the end of MATLAB's text.
-    is_matlab_73 = head.startswith(_MATLAB_73) and head[124:128] in (b"\x00\x02IM", b"\x02\x00MI")
+    # The version and the order of bytes are the last four bytes of MATLAB's header.
+    has_version = begin[124:128] in (b"\x00\x02IM", b"\x02\x00MI")
+    is_matlab_73 = begin.startswith(_MATLAB_73) and has_version
     # In files of MATLAB 7.3, 512 bytes of its own stand before the signature of HDF5.
-    is_hdf5 = head.startswith(_HDF5) or head[512:].startswith(_HDF5)
+    is_hdf5 = begin.startswith(_HDF5) or begin[512:].startswith(_HDF5)
     if group and (is_matlab_73 or not is_hdf5):
         problem = f"a format without groups, but the mapping has group = {group!r}"
         raise InputError(f"{path}: {problem}; allowed: leave `group` out, or an HDF5 file")
-    if head.startswith(_ZIP):
+    if begin.startswith(_ZIP):
         arrays, objects = _numpy_archive(path)
         table = table_of(source, arrays)
         left_out = {name: LeftOut("an array of Python objects", True) for name in objects}
         return replace(table, left_out={**table.left_out, **left_out})
-    if head.startswith(_MATLAB_5) or _is_matlab_4(head) or is_matlab_73:
+    if begin.startswith(_MATLAB_5) or _is_matlab_4(begin) or is_matlab_73:
         return table_of(source, _matlab(path, is_hdf5=is_matlab_73))
-    if head.startswith(_NETCDF3):
+    if begin.startswith(_NETCDF3):
         return _decoded(source, *_netcdf_3(path))
     if path.suffix.lower() == ".outb":
         return replace(table_of(source, *_openfast(path)), program="openfast")
     if is_hdf5:
         return _hdf5(path, group, scene)
-    if b"\x00" in head and not head.startswith(_UTF_16):
+    if b"\x00" in begin and not begin.startswith(_UTF_16):
         raise InputError(f"{path}: not a format that can be read; allowed: {FORMATS}")
     content = path.read_bytes()
     try:
@@ -237,7 +240,7 @@ def _numpy_archive(path: Path) -> tuple[Arrays, list[str]]:
 # MAT files
 
 
-def _is_matlab_4(head: bytes) -> bool:
+def _is_matlab_4(begin: bytes) -> bool:
     """Return whether a file begins with the header of an array as MATLAB 4 writes it.
 
     The header has five whole numbers: machine, precision and kind as decimal digits of one number;
@@ -245,13 +248,13 @@ def _is_matlab_4(head: bytes) -> bool:
 
     Parameters
     ----------
-    head : the first bytes of the file; fewer than 20 are no header.
+    begin : the first bytes of the file; fewer than 20 are no header.
     """
-    if len(head) < 20:
+    if len(begin) < 20:
         return False
     # Files are written in the order of bytes of their machine: both are tried.
     for order in "<>":
-        kind, rows, columns, is_complex, length = struct.unpack(f"{order}5i", head[:20])
+        kind, rows, columns, is_complex, length = struct.unpack(f"{order}5i", begin[:20])
         digits = kind // 1000, kind // 100 % 10, kind // 10 % 10, kind % 10
         is_kind = digits[0] in (0, 1) and not digits[1] and digits[2] < 6 and digits[3] < 3
         if is_kind and min(rows, columns) > 0 and is_complex in (0, 1) and 1 < length < 100:
@@ -286,7 +289,7 @@ def _matlab(path: Path, *, is_hdf5: bool) -> Arrays:
         refuse_claims(path, MAX_BYTES)
     try:
         if not is_hdf5:
-            # The heads of the arrays alone are unpacked for this, not structures and cells.
+            # This reads the headers of the arrays alone: structures and cells are not unpacked.
             shapes = [shape for _, shape, kind in whosmat(path) if kind in _MATLAB_NUMBERS]
             _refuse_large(path, sum(8.0 * math.prod(shape) for shape in shapes))
         content = read_mat(str(path))
@@ -335,7 +338,7 @@ def _all_parts(path: str, value: Any) -> Iterator[tuple[str, Any]]:
 
 
 def _sample(value: Any) -> Any:
-    """Return a list in place of a value that has parts, a number in place of any other."""
+    """Return [0] for a value that has parts, 0 for any other: `np.ndim` tells them apart."""
     return [0] if isinstance(value, list | dict | np.ndarray) and len(value) else 0
 
 
@@ -376,8 +379,8 @@ def _netcdf_3(path: Path) -> tuple[Arrays, Mapping[str, Mapping[str, Any]]]:
 
     arrays: dict[str, Any] = {}
     attributes: dict[str, dict[str, Any]] = {}
-    # Variables are views of the file, until they are copied: several may be views of the same
-    # bytes.
+    # Variables are views of the file. Several may be views of the same bytes, so that a small file
+    # may claim large arrays: their sizes are checked before they are copied.
     with netcdf_file(path, "r", mmap=True, maskandscale=False) as file:
         sizes = [8.0 * math.prod(variable.shape) for variable in file.variables.values()]
         _refuse_large(path, sum(sizes))
@@ -422,7 +425,8 @@ def _hdf5(path: Path, group: str, scene: str) -> DataTable:
         allowed = "a table that other programs can read: to_csv, or to_xarray().to_netcdf"
         raise InputError(f"{path}: pandas' own layout of HDF5 (to_hdf); allowed: {allowed}")
     for name, values in arrays.items():
-        # Floating-point rows that netCDF's library never wrote; HDF5's own are 0.
+        # The netCDF library fills floating-point rows that were never written with this number; the
+        # HDF5 library fills them with 0.
         fill = _DEFAULT_FILL.get(values.dtype.str[1:]) if values.dtype.kind == "f" else None
         if fill is not None:
             attributes[name].setdefault("_FillValue", fill)
@@ -471,8 +475,8 @@ def _decoded(source: str, arrays: Arrays, attributes: Mapping[str, Mapping[str, 
         if is_packed and values.dtype.kind in "iu":
             if "scale_factor" in facts:
                 steps[name] = abs(float(np.asarray(facts["scale_factor"]).ravel()[0]))
-            # By default xarray may unpack into single precision, whose rounding would be its own:
-            # it takes the precision of these two.
+            # xarray unpacks into the precision of these two. Single precision would add a rounding
+            # that the data do not have.
             for key, default in (("scale_factor", 1.0), ("add_offset", 0.0)):
                 facts[key] = np.float64(np.asarray(facts.get(key, default)).ravel()[0])
         dimensions = [f"dimension_{number}_{axis}" for axis in range(values.ndim)]
@@ -484,7 +488,7 @@ def _decoded(source: str, arrays: Arrays, attributes: Mapping[str, Mapping[str, 
     overflown = {}
     for name in steps:
         stored = arrays[name].ravel()
-        # A number that is too large for 32 or 64 bits becomes the least one of them.
+        # A number that does not fit 32 or 64 bits is stored as the smallest integer.
         is_least = (stored == np.iinfo(stored.dtype).min) & np.isfinite(unpacked[name].ravel())
         is_signed = stored.dtype.kind == "i" and variables[name][2].get("_Unsigned") != "true"
         if is_signed and stored.itemsize > 2 and is_least.any():
@@ -518,11 +522,12 @@ def _openfast(path: Path) -> tuple[Arrays, Units]:
     except ImportError as exc:
         hint = 'pip install "rotor_mbs[openfast]", or text output (OutFileFmt 1)'
         raise InputError(f"{path}: openfast_io is not installed; allowed: {hint}") from exc
-    # That reader allocates what the header claims, so that the claim is checked before.
+    # That reader allocates what the header claims, so the claim is checked first.
     with path.open("rb") as file:
-        head = file.read(12)
-    counts = struct.unpack_from("<ii", head, 4 if head[:2] == b"\x04\x00" else 2)  # channels, rows
-    number_bytes = 8 if head[:2] == b"\x03\x00" else 2
+        begin = file.read(12)
+    offset = 4 if begin[:2] == b"\x04\x00" else 2
+    counts = struct.unpack_from("<ii", begin, offset)  # channels, rows
+    number_bytes = 8 if begin[:2] == b"\x03\x00" else 2
     if min(counts) < 0 or math.prod(counts) * number_bytes > path.stat().st_size:
         problem = "cannot be read: it has fewer numbers than it claims"
         raise InputError(f"{path}: {problem}; allowed: {FORMATS}")
@@ -546,8 +551,9 @@ def _json(text: str) -> tuple[Arrays, Units]:
 
     Parameters
     ----------
-    text : content of the file. A table has its rows as objects, in one list or a line each; or is
-        {"columns": ..., "data": ...}; or has each column, or each row, as an object.
+    text : content of the file. The forms of a table are: a list of objects, one for each row; an
+        object on each line; {"columns": ..., "data": ...}; an object with an object for each
+        column, or for each row.
 
     Returns
     -------
@@ -590,7 +596,7 @@ def _json(text: str) -> tuple[Arrays, Units]:
 
 
 def _with_nulls(table: DataTable) -> DataTable:
-    """Return the columns of JSON, with null as what stands in place of a missing number."""
+    """Return the columns of JSON, each with the place of its first null as `missing`."""
     columns = {}
     for name, column in table.columns.items():
         is_missing = np.isnan(column.values)
@@ -625,7 +631,7 @@ def _read_text(source: str, text: str) -> DataTable:
             lines.append((number, line.strip(" ")))
     lines = _with_vectors_as_columns(lines)
     first, divider = _first_row(source, lines)
-    head = [line for _, line in lines[:first]]  # comments among it
+    head = [line for _, line in lines[:first]]  # with comments
     closing = {}
     width = len(_fields(lines[first][1], divider))
     while len(lines) > first + 1 and _is_closing(lines[-1][1], divider, width):
@@ -642,7 +648,7 @@ def _read_text(source: str, text: str) -> DataTable:
     plain = [line for line in head if not line.startswith(_COMMENT)]
     names = _names(source, plain or comments, len(columns), divider)
     named: dict[str, DataColumn] = {}
-    headers: dict[str, str] = {}  # of columns with a name that is there before
+    headers: dict[str, str] = {}  # of columns whose name an earlier one has
     left_out: dict[str, LeftOut] = dict(closing)
     repeats: dict[str, int] = {}
     for number, ((name, unit), values) in enumerate(zip(names, columns, strict=True)):
@@ -726,16 +732,15 @@ def _exudyn(
     Returns
     -------
     DataTable or None
-        Columns named by the head of the file, of several solves the last one; None for a file of
-        another kind.
+        Columns of the last solve, named by the head of the file; None for a file of another kind.
 
     Raises
     ------
     InputError
         If a column is not of numbers, or there are more or fewer columns than the head says.
     """
-    head = "\n".join(comments)
-    variable, written = _EXUDYN.search(head), _EXUDYN_SOLUTION.search(head)
+    text = "\n".join(comments)
+    variable, written = _EXUDYN.search(text), _EXUDYN_SOLUTION.search(text)
     if variable is None and written is None:
         return None
     for number, column in enumerate(columns, start=1):
@@ -791,8 +796,8 @@ def _first_row(source: str, lines: Lines) -> tuple[int, str | None]:
             fields = _fields(line, divider)
             numbers, others = _kinds_of_fields(fields, divider)
             if len(fields) > 1 and numbers and not others:
-                # A row before it may have a text in place of a number: no header then, if it
-                # begins with a number, as a time is.
+                # An earlier line that begins with a number, as a row does with its time, is no
+                # header but a row, which has a text in place of another number.
                 with_texts = _first_row_with_texts(lines[: place + 1])
                 if with_texts is not None:
                     first = _fields(lines[with_texts[0]][1], with_texts[1])[0]
@@ -813,7 +818,9 @@ def _first_row(source: str, lines: Lines) -> tuple[int, str | None]:
 
 
 def _first_row_with_texts(lines: Lines) -> tuple[int, str | None] | None:
-    """Find the first of two rows with numbers and texts below a line of as many texts.
+    """Find the first row of a table in which some columns are texts.
+
+    Two rows with numbers follow a header, which has as many fields and no numbers.
 
     Parameters
     ----------
@@ -853,7 +860,7 @@ def _kinds_of_fields(fields: Sequence[str], divider: str | None) -> tuple[int, l
 
 
 def _without_fortran(field: str) -> str:
-    """Return a number as other programs write it: 1.5D-3 and 0.15-101 have an E."""
+    """Return a number of Fortran with an E: 1.5E-3 for 1.5D-3, 0.15E-101 for 0.15-101."""
     return _FORTRAN_3_DIGITS.sub("E", _FORTRAN.sub("E", field))
 
 
@@ -881,14 +888,14 @@ def _columns_of_rows(
     Parameters
     ----------
     source : what messages call the file.
-    rows : the lines of numbers, and their numbers in the file.
+    rows : line number in the file, and text, of each row.
     divider : what divides the fields of a line, None for blanks.
 
     Returns
     -------
     list of ndarray or LeftOut
-        (n,) numbers of each column, NaN where a field is empty; or the first field that is no
-        number.
+        (n,) numbers of each column, NaN where a field is empty; of a column with a field that is
+        no number, the first such field.
 
     Raises
     ------

@@ -2,9 +2,9 @@
 
 Every search for a cause has the same form, whatever the data are: columns of a trajectory, defects
 of intervals, loads, frequencies. There are candidates, each with a text, with what it changes in
-the data or the model, and with a price in freedom: the number of mistakes or parameters that it
-takes. There is a measure of what a change leaves of the difference. What leaves no more than is
-allowed explains it; of these the cheapest, or those that leave least, are named.
+the data or the model, and with a price: the number of mistakes or parameters that it takes. There
+is a measure of what a change leaves of the difference. What leaves no more than is allowed explains
+it; of these the cheapest, or those that leave least, are named.
 """
 
 from __future__ import annotations

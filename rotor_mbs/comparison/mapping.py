@@ -51,7 +51,8 @@ class ColumnMapping:
     unit : of the column, "" for the one that the file states, or the channel's SI unit.
     sign : 1 or -1.
     offset : in the column's unit.
-    wrapped : whether turns are missing, so that jumps of more than half a turn are taken out.
+    wrapped : whether the angle starts again after each turn: jumps of more than half a turn are
+        removed.
     frame : of a load, "" for that of the scene's loads.
     """
 
@@ -411,7 +412,7 @@ def _refuse_missing(
     suggested: Sequence[Channel],
     mapping: DataMapping,
 ) -> None:
-    """Raise InputError if the time or speed is missing, or everything that is compared with it.
+    """Raise InputError if there is no time or speed, or no angle, rate or frequency.
 
     Parameters
     ----------
@@ -422,15 +423,19 @@ def _refuse_missing(
     mapping : what is said of the columns.
     """
     first = known[0]
-    has_compared = any(_is_compared(channel, first) for channel in chosen)
-    if first in chosen and has_compared:
+    has_motion_or_mode = any(_is_motion_or_mode(channel, first) for channel in chosen)
+    if first in chosen and has_motion_or_mode:
         return
     compared = ["frequency"] if first.name == SPEED else ["angle", "rate"]
     if mapping.program and table.program != mapping.program:
-        # Names that are known without the program's: its own are read alone.
+        # With `program`, only the program's own names are recognized: is what is missing there
+        # under another name?
         plain = [channel for channel, _ in _suggested(table, known)]
-        is_known = any(_is_compared(channel, first) for channel in plain)
-        if first in plain if first not in chosen else is_known:
+        if first in chosen:
+            is_there = any(_is_motion_or_mode(channel, first) for channel in plain)
+        else:
+            is_there = first in plain
+        if is_there:
             problem = f'program = "{mapping.program}" reads the names of OpenFAST\'s output alone'
             raise InputError(f"{table.source}: {problem}; allowed: leave `program` out")
     available = shown_names(list(table.columns))
@@ -438,7 +443,7 @@ def _refuse_missing(
         allowed = f"`{first.key}` in a mapping file"
         problem = f"no column for the {first.name}; available: {available}"
         raise InputError(f"{table.source}: {problem}; allowed: {allowed}")
-    unwanted = [channel for channel in suggested if _is_compared(channel, first)]
+    unwanted = [channel for channel in suggested if _is_motion_or_mode(channel, first)]
     if unwanted:
         lists = []
         if any(_is_one_of(channel, mapping.omitted) for channel in unwanted):
@@ -454,13 +459,13 @@ def _refuse_missing(
         for reason in other_lengths.values():
             raise InputError(f"{table.source}: {reason}; allowed: as many, rotor first")
     problem = f"no column for a{'n' * (first.name != SPEED)} {' or a '.join(compared)}"
-    key = next(channel.key for channel in known if _is_compared(channel, first))
+    key = next(channel.key for channel in known if _is_motion_or_mode(channel, first))
     allowed = f"a mapping file (--columns) with `{key}` or others"
     raise InputError(f"{table.source}: {problem}; available: {available}; allowed: {allowed}")
 
 
-def _is_compared(channel: Channel, first: Channel) -> bool:
-    """Return whether a channel is an angle, rate or frequency, beside the time or speed."""
+def _is_motion_or_mode(channel: Channel, first: Channel) -> bool:
+    """Return whether a channel is an angle, rate or frequency; `first` is the time or speed."""
     return not channel.is_load and channel != first
 
 

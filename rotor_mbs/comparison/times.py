@@ -58,8 +58,8 @@ def ordered_rows(
     Raises
     ------
     InputError
-        If two different rows have one time and no load jumps there, or if fewer than three rows are
-        left.
+        If two different rows have one time, unless a load jumps there and they have the same
+        motion; or if fewer than three rows are left.
     """
     notes = []
     if len(time) < _MIN_ROWS:
@@ -71,8 +71,8 @@ def ordered_rows(
     if (np.diff(time) < 0.0).any():
         is_descending = bool((np.diff(time) <= 0.0).all())
         if is_descending:
-            # A stable sort keeps rows of one time in their order, which in a descending file is
-            # from after a jump to before it: the rows are reversed first.
+            # At a jump of a load, a descending file has the row after the jump first. The sort
+            # keeps the order of rows of one time, so the rows are reversed before it.
             places = places[::-1]
         places = places[np.argsort(time[places], kind="stable")]
         was = "from the end to the start" if is_descending else "not in the order of their times"
@@ -129,7 +129,7 @@ def rounding_of_steps(time: Array) -> Array | None:
     """Find the rounding of times whose intervals are equal, or equal but for a few.
 
     Equal intervals are taken as exact, though the times have few digits; a few that differ are
-    faults of the clock. Times that are sums of a step are off by the rounding of the additions,
+    mistakes in the times. Times that are sums of a step are off by the rounding of the additions,
     which no single time shows.
 
     Parameters
@@ -154,8 +154,8 @@ def rounding_of_steps(time: Array) -> Array | None:
     from_line = np.abs(time - (time[0] + mean * rows))
     if from_line.max() <= 4.0 * _ROUNDOFF * np.abs(time).max():
         return rounding
-    # Otherwise the times are sums of a chosen step, which is the mean rounded to some digits: their
-    # distance from its multiples counts, up to what the additions may have rounded.
+    # Otherwise the times are sums of a chosen step: the mean interval, rounded to some digits. The
+    # additions make them differ from multiples of this step; a larger difference is no rounding.
     digits = _STEP_DIGITS - 1 - math.floor(math.log10(mean))
     from_chosen = np.abs(time - (time[0] + round(mean, digits) * rows))
     return np.asarray(rounding + np.minimum(from_chosen, rows * rounding))

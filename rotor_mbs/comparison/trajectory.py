@@ -54,7 +54,7 @@ _TIME_ROUNDING = 1e-9  # of the duration, by which times that are sums of steps 
 _MIN_ROWS = 3
 _STAGES = 4  # reference, interval defects, search for causes, loads
 _SAME_START = 1e-3  # rad, rad/s: starts that differ by more are another start
-_LEFT_OF_SMALL = 0.02  # share of errors within the tolerance that a cause may leave
+_LEFT_OF_SMALL_ERRORS = 0.02  # share that a cause may leave of errors within the tolerance
 _MAX_GAP = 1.5  # largest number of intervals without rows at the start or end of the motion
 
 
@@ -122,7 +122,7 @@ class TrajectoryErrors:
 
 
 @caller_signals()
-@np.errstate(all="ignore")  # data may be of any size
+@np.errstate(all="ignore")  # numbers of data may be so large that they overflow
 def compare_with_reference(
     data: ForeignData,
     scene: Scene,
@@ -133,8 +133,8 @@ def compare_with_reference(
     """Compare a trajectory with the reference of a scene.
 
     Three things are judged: the first row, the defects of all rows (each channel's against its own
-    rounding), and the errors up to the horizon. Where these are larger than rounding explains, a
-    search for the likely cause follows.
+    rounding), and the errors up to the horizon. Then likely causes are searched for, also in data
+    that agree, whose small defects may be systematic.
 
     Parameters
     ----------
@@ -158,7 +158,7 @@ def compare_with_reference(
     is_available()  # loads the engine before the time limit, which could interrupt its import
     ends = monotonic() + time_limit_s
     loads, data = data.only(loads=True), data.only(loads=False)
-    missing_part = "no reference"  # within the time limit
+    missing_part = "no reference"  # for the message at the time limit
     try:
         with time_limit(time_limit_s):
             on_stage("reference", 0, _STAGES)
@@ -345,8 +345,8 @@ def _errors_of(
         predicted = float(np.abs(rows.defects.predicted[: rows.until]).max())
     sums = _largest_sums(scene, rows.defects)
     beyond_digits = _beyond_digits(scene, tolerance, rows.defects)
-    # Errors are divided by the growth of an initial error: in a motion whose errors do not grow,
-    # faults below the tolerance of an interval add up to an error that is judged by this.
+    # Errors are divided by the growth of an initial error. Faults that are below the tolerance in
+    # each interval may add up to an error above it: where errors do not grow, this shows it.
     exact = rows.exact
     carried = carried_errors(exact.trajectory, exact.growth, exact.units)
     carried = carried[rows.places][:, data.columns]
@@ -402,7 +402,7 @@ def _channel_errors(scene: Scene, rows: ReferencedRows, error: Array) -> tuple[C
 
 
 def _largest_interval(defects: Defects) -> int:
-    """Return the number of the interval whose defect exceeds what is allowed most."""
+    """Return the number of the interval whose defect is largest relative to what is allowed."""
     excess = defects.in_bound_units(defects.channel_excess).max(axis=1)
     return int(np.where(defects.is_resolved, excess, 0.0).argmax())
 
@@ -491,7 +491,7 @@ def _findings(
 def _wrong_first_row(
     tolerance: float, rows: ReferencedRows, errors: TrajectoryErrors
 ) -> Iterator[tuple[str, str]]:
-    """Yield the largest deviation of the first row from the scene's initial state.
+    """Yield the largest deviation of the first row from the reference, if it is too large.
 
     Parameters
     ----------
@@ -589,7 +589,7 @@ def _unchecked_parts(
 
     Parameters
     ----------
-    data : angles and rates; its omitted channels are not missed.
+    data : angles and rates, of which the omitted ones may be missing.
     rows, errors : the data with their reference, and their errors.
     """
     defects, until = rows.defects, rows.until
@@ -676,8 +676,9 @@ def _likely_causes(
     """Search for likely causes of the differences, in words.
 
     In data that do not agree, mistakes in columns and times are searched for, then other models.
-    Data that agree may still have correlated defects, from which another model is recognized, or a
-    small mistake, if a defect is more than the digits of the data explain.
+    In data that agree, small mistakes are searched for if a defect is larger than the digits of the
+    data explain; then another model, which may be recognized from defects that are small but
+    correlated.
 
     Parameters
     ----------
@@ -699,7 +700,7 @@ def _likely_causes(
             return []
         texts: list[str] = []
         if errors.beyond_digits > FLOOR_SAFETY:
-            smaller = min(tolerance, _LEFT_OF_SMALL * float(errors.excess_per_growth.max()))
+            smaller = min(tolerance, _LEFT_OF_SMALL_ERRORS * float(errors.excess_per_growth.max()))
             search = TrajectorySearch(scene, whole, rows.exact, smaller, worst, True)
             texts = data_mistakes(search)
         return texts or DefectSearch(judged, BRIEF_SEARCH).explanations()

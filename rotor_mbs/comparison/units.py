@@ -11,14 +11,17 @@ import re
 from collections.abc import Mapping
 
 _RADIAN, _DEGREE, _TURN = 1.0, math.pi / 180.0, 2.0 * math.pi
-# By spelling in lower case: exponents of time, angle, force and length; factor to SI units.
+# Exponents of time, angle, force and length; factor to SI units.
 _Atom = tuple[tuple[int, int, int, int], float]
 _TIME, _ANGLE, _FORCE, _LENGTH = (1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1)
 _PER_TIME, _RATE, _MOMENT = (-1, 0, 0, 0), (-1, 1, 0, 0), (0, 0, 1, 1)
 
 
 def _spelled(dimension: tuple[int, int, int, int], **names: float) -> dict[str, _Atom]:
-    """Return atoms of one dimension; names: the factor by spellings that "_" divides."""
+    """Return atoms of one dimension by their spellings.
+
+    A keyword has spellings joined by "_"; its value is their factor.
+    """
     atoms = {}
     for spellings, factor in names.items():
         for spelling in spellings.split("_"):
@@ -26,6 +29,7 @@ def _spelled(dimension: tuple[int, int, int, int], **names: float) -> dict[str, 
     return atoms
 
 
+# By spelling in lower case.
 _ATOMS: dict[str, _Atom] = {
     **_spelled(_TIME, s_sec_secs_second_seconds_sekunde_sekunden=1.0, min_minute_minutes=60.0),
     **_spelled(_TIME, h_hr_hour_hours=3600.0, ms_msec_millisecond_milliseconds=1e-3),
@@ -42,7 +46,7 @@ _ATOMS: dict[str, _Atom] = {
     **_spelled(_LENGTH, m_meter_meters_metre_metres=1.0, mm=1e-3, cm=1e-2, km=1e3),
     **_spelled(_MOMENT, nm=1.0, knm=1e3),
 }
-# What differs by its case alone.
+# Spellings in which the case decides.
 _EXACT: dict[str, _Atom] = {
     "MN": (_FORCE, 1e6),
     "mN": (_FORCE, 1e-3),
@@ -108,7 +112,7 @@ def unit_factor(unit: str, kind: str) -> float | None:
     parsed = _parsed(plain_unit(unit))
     if parsed is None or parsed[0] not in _DIMENSIONS[kind]:
         return None
-    # Per minute may be turns per minute: only per second is an angle in rad.
+    # "1/min" may mean turns per minute, and is refused; "1/s" is rad/s.
     if parsed[0] == _PER_TIME and parsed[1] != 1.0:
         return None
     return parsed[1]

@@ -20,7 +20,8 @@ from rotor_mbs.solution.defects import Defects
 from rotor_mbs.solution.trajectory import Array
 
 LEVELS = (1e-3, 1e-6, 1e-9)  # rad, rad/s or relative, see `agrees_until`
-DEFAULT_TOLERANCE = 1e-6  # rad, of an interval's defect; of a load's largest; of a frequency
+# rad, of an interval's defect; relative to a load's largest magnitude, or to a frequency
+DEFAULT_TOLERANCE = 1e-6
 # Limits of the names of unused columns in a file: their number, and their length as JSON; an
 # attribute of HDF5 has at most 64 kB.
 _MAX_NAMES, _MAX_NAME_BYTES = 100, 30_000
@@ -30,15 +31,17 @@ _MAX_NAMES, _MAX_NAME_BYTES = 100, 30_000
 class ChannelErrors:
     """Errors of a channel of data, such as "pitch 1" in "rad".
 
-    Angles and rates are compared with the reference, loads with those at the states of the data.
+    Angles and rates are compared with the reference, loads with those of the closed form at the
+    states of the data, frequencies with those of the closed form.
 
     Attributes
     ----------
     error_max, error_whole : the largest error up to the horizon, and over all rows.
     defect : the judged error, less what the rounding of the data explains; None if it is unknown.
-        For an angle or a rate (times the interval) it is the largest defect of an interval, rad;
-        for a load the largest error relative to the load's largest magnitude; for a frequency the
-        largest relative error.
+        For an angle or a rate (times the interval) it is the largest defect of an interval, rad,
+        each divided by its interval's `bound_factors` (see `solution.defects`); for a load the
+        largest error relative to the load's largest magnitude; for a frequency the largest relative
+        error.
     floor : the largest such error that rounding explains.
     agrees_until : see the function of this name.
     """
@@ -61,11 +64,12 @@ class DataVerdict:
     ----------
     source : name of the file.
     status, message : as of a run: "ok", or another one and why in a line.
-    tolerance : rad, of an interval's defect.
-    rows, compared_until, horizon_s : rows compared, time of the last one (s), horizon of the scene
-        (s); None of modes.
+    tolerance : on the channels' `defect`, in its unit.
+    rows, compared_until, horizon_s : number of rows compared; time of the last one, s; horizon of
+        the scene, s, None for modes.
     defect_time : s, end of the interval of the largest defect; None if it is unknown.
-    predicted : rad, the error up to the horizon to which the defects add up; None if it is unknown.
+    predicted : rad, the largest error up to the horizon to which the defects add up; None if it is
+        unknown.
     read : how columns were read, a line each.
     unused : by name of every other column, why it is not compared.
     notes : what else a user should know.
