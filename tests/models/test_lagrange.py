@@ -12,9 +12,10 @@ from support.other_code import acceleration
 from support.runs import run
 from support.scenes import general, paper
 
-from rotor_mbs.models.lagrange import closed_form, reference
+from rotor_mbs.models.lagrange import closed_form, reference, taylor
 from rotor_mbs.models.lagrange.closed_form import LoadValues
 from rotor_mbs.models.lagrange.parameters import rotor_form
+from rotor_mbs.models.lagrange.reference import error_growth
 from rotor_mbs.scenario.scene import Scene
 
 pytest.importorskip("heyoka")
@@ -58,6 +59,21 @@ def test_accelerations_are_those_of_the_equations_written_anew(scene: Scene) -> 
         )
         right = acceleration(scene, 0.0, np.concatenate([q, w]))[count:]
         assert np.abs(computed - right).max() <= 1e-13 / share * (np.abs(right).max() + cancelling)
+
+
+def test_error_growth_in_parts_is_that_of_the_whole(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A long run is integrated in parts, of which only the growth is kept; loads change in some."""
+    pytest.importorskip("heyoka")
+    driven = paper("fig15-100kNm", duration=3.0, samples=32)
+    torque = ((0.0, 0.0), (1.05, 1e5), (1.05, 0.0), (3.0, 2e5))
+    for scene in (paper("fig11", duration=3.0, samples=32), replace(driven, rotor_torque=torque)):
+        whole = error_growth(scene)
+        with monkeypatch.context() as patched:
+            patched.setattr(taylor, "KEPT_ROWS", 4)
+            parts = error_growth(scene)
+        assert np.isfinite(whole).all()
+        # Steps end with a part, so that other digits are rounded.
+        np.testing.assert_allclose(parts, whole, rtol=1e-12)
 
 
 def test_error_growth_is_that_of_neighbouring_runs() -> None:

@@ -122,11 +122,11 @@ def test_a_reference_that_fails_says_why_and_how_far_the_better_run_came(failing
         )
         for name, reached, steps in (("best", 2.0, 20), ("check", 1.0, 10))
     }
-    solver: Any = object.__new__(ReferenceSolver)
-    solver._runs = [
-        SimpleNamespace(integrate=lambda report=report: report) for report in runs.values()
-    ]
-    result = solver.integrate()
+    solver_runs: Any = []
+    for report in runs.values():
+        states = np.zeros((1, 4))
+        solver_runs.append(SimpleNamespace(integrate=lambda report=report: report, states=states))
+    result = ReferenceSolver(paper("fig03"), solver_runs, 1e-30).integrate()
     assert (result.success, result.time_reached, result.steps) == (not failing, 2.0, 20)
     assert result.message == (f"{failing} failed" if failing else "")
 
@@ -152,7 +152,16 @@ def test_a_reference_of_which_one_run_ends_early(
     solver = build(scene, ReferenceSettings())
     solver.integrate()
     whole = solver.observe()
-    solver._runs[shorter].states = solver._runs[shorter].states[:rows]
+    run: Any = solver._runs[shorter]
+    integrate_whole = run.integrate
+
+    def integrate_part() -> Integration:
+        report: Integration = integrate_whole()
+        run.states = run.states[:rows]
+        return report
+
+    monkeypatch.setattr(run, "integrate", integrate_part)
+    solver.integrate()
     result = solver.observe()
     assert result.error_growth is not None
     assert len(result.time) == len(result.error_growth) == len(result.angle_uncertainty) == rows

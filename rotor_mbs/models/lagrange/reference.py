@@ -26,7 +26,7 @@ from rotor_mbs.models.lagrange.samples import quad_loads
 from rotor_mbs.models.lagrange.taylor import Propagation
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.defects import row_blocks
-from rotor_mbs.solution.trajectory import Array, Integration, Trajectory
+from rotor_mbs.solution.trajectory import Array, Integration, Trajectory, sample_times
 
 # The uncertainty is this many times what two runs show. They differ in their truncation errors and
 # in the rounding of each step, but not in what they share: the rounded coefficients, and the
@@ -64,34 +64,44 @@ class ReferenceSolver:
         self, scene: Scene, runs: Sequence[Propagation | OdeSolver], epsilon: float
     ) -> None:
         self._scene, self._runs, self._epsilon = scene, runs, epsilon
+        self._difference = np.zeros(1)  # (n,) rad, of the angles of both runs
 
     def integrate(self) -> Integration:
         """Integrate both runs; the report is the first's, with the failure of either."""
         best, check = (run.integrate() for run in self._runs)
+        self._difference = self._angle_difference()
+        # The states of a million samples in quad precision are 130 MB: only the first run's stay.
+        self._runs[1].states = self._runs[1].states[:1].copy()
         failed = best if not best.success else check
         return replace(
             best, success=failed.success, message=failed.message, out_of_time=failed.out_of_time
         )
 
+    def _angle_difference(self) -> Array:
+        """Return the largest difference of an angle at each common sample, (n,) rad."""
+        best, check = (run.states for run in self._runs)
+        angles = slice(len(self._scene.moving_coordinates))
+        difference = np.empty(min(len(best), len(check)))
+        for rows in row_blocks(len(difference)):
+            both = np.abs((best[rows] - check[rows])[:, angles])
+            difference[rows] = both.astype(float).max(axis=1)
+        return difference
+
     def observe(self) -> Trajectory:
         """Return the samples of the first run, with its uncertainty and the growth of errors."""
-        rows = min(len(run.states) for run in self._runs)
-        best, check = (run.states[:rows] for run in self._runs)
+        rows = len(self._difference)
+        best = self._runs[0].states[:rows]
         self._runs[0].states = best
         result = self._runs[0].observe()
         if self._scene.wants("loads") and best.dtype != np.float64:
             result.quantities |= quad_loads(self._scene, result.time, best)
-        angles = slice(len(self._scene.moving_coordinates))
-        difference = np.abs((best - check)[:, angles]).astype(float).max(axis=1)
         result.quantities["angle_uncertainty"] = uncertainty(
-            difference, result.angles, self._epsilon
+            self._difference, result.angles, self._epsilon
         )
         # Over what was reached only: the rest of a run that its time limit ended may take too long.
         if rows > 1:
             reached = replace(self._scene, duration=float(result.time[-1]), samples=rows)
-            result.quantities["error_growth"] = _largest_growth(
-                reached, _transition_matrices(reached, result.time)
-            )
+            result.quantities["error_growth"] = error_growth(reached, result.time)
         else:
             result.quantities["error_growth"] = np.ones(rows)
         return result
@@ -146,14 +156,34 @@ def _in_doubles(
     return OdeSolver(scene, integrator, times)
 
 
-def error_growth(scene: Scene) -> Array:
+def error_growth(scene: Scene, times: Array | None = None) -> Array:
     """Return how many times a small error of the initial state may have grown, at most, (samples,).
 
     It is the largest singular value of the state transition matrix (rad, `rate_units`) in the
     coordinates that the motion can have; pitches at rest by symmetry are not among them. It is
     infinite once past what double precision can hold.
+
+    Parameters
+    ----------
+    scene : the run.
+    times : (samples,) s of the samples; the scene's where left out.
     """
-    return _largest_growth(scene, _variational_matrices(scene))
+    if not is_available():
+        times = sample_times(scene) if times is None else times
+        return _largest_growth(scene, _matrices_by_quotients(scene, times))
+
+    # The matrices of a million samples are half a gigabyte: only their growth is kept.
+    def growth_of(states: Array) -> Array:
+        matrices = _matrices_in(states, scene)
+        return _largest_growth(scene, matrices)[: len(matrices), None]
+
+    propagation = Propagation(
+        scene, variational=True, compact_mode=True, times=times, keep=growth_of
+    )
+    propagation.integrate()
+    growth = np.full(scene.samples, np.inf)
+    growth[: len(propagation.states)] = propagation.states[:, 0]
+    return growth
 
 
 def _transition_matrices(scene: Scene, times: Array) -> Array:
@@ -178,11 +208,18 @@ def _transition_matrices(scene: Scene, times: Array) -> Array:
 
 def _variational_matrices(scene: Scene, times: Array | None = None) -> Array:
     """Return the state transition matrices by heyoka's variational equations."""
-    count = 2 * len(scene.moving_coordinates)
     propagation = Propagation(scene, variational=True, compact_mode=True, times=times)
     propagation.integrate()
-    # No copy: those of a million samples are half a gigabyte. The state is the first of the rows.
-    return np.asarray(propagation.states.reshape(-1, 1 + count, count)[:, 1:])
+    return _matrices_in(propagation.states, scene)
+
+
+def _matrices_in(states: Array, scene: Scene) -> Array:
+    """Return the state transition matrices in the rows of variational states, without a copy.
+
+    The first row of each matrix-shaped block is the state itself.
+    """
+    count = 2 * len(scene.moving_coordinates)
+    return np.asarray(states.reshape(-1, 1 + count, count)[:, 1:])
 
 
 def _matrices_by_quotients(scene: Scene, times: Array) -> Array:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import copy
+import itertools
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from fractions import Fraction
 from importlib.util import find_spec
 from typing import Any
@@ -27,6 +29,7 @@ from rotor_mbs.models.lagrange.parameters import (
 from rotor_mbs.models.lagrange.samples import Advance, at_constant_rests, over_segments
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import Segment
+from rotor_mbs.solution.defects import KEPT_ROWS
 from rotor_mbs.solution.trajectory import Array, Integration, Trajectory, sample_times
 
 # Unrolled code is twice as fast as compact code, but its compile time grows with the number of
@@ -188,6 +191,7 @@ class Propagation:
         quad: bool = False,
         variational: bool = False,
         times: Array | None = None,
+        keep: Callable[[Array], Array] | None = None,
         **options: Any,
     ) -> None:
         """Compile the equations, or take what is compiled for another scene of the same structure.
@@ -198,6 +202,9 @@ class Propagation:
         quad : whether in quad precision; else in doubles.
         variational : whether to integrate the state transition matrix, too.
         times : (n,) s of the samples; the scene's where left out.
+        keep : function of the (k, variables) states at up to `KEPT_ROWS` consecutive samples that
+            returns what is kept of them, (k, values); all is kept where left out. A long run is
+            integrated in parts of so many samples then.
         options : of the engine.
 
         Raises
@@ -236,18 +243,25 @@ class Propagation:
         self.integrator = compiled(key, make, self)
         set_parameters(self.integrator, array_of(parameters.values, quad=quad))
         self._initial = np.concatenate([start, np.eye(count).ravel()]) if variational else start
-        self._segments = scene.load_segments
         self.times = sample_times(scene) if times is None else times
-        self.states = self._initial[None, :]
+        self._keep = keep
+        self._segments: Sequence[Segment] = scene.load_segments
+        if keep is not None:
+            self._segments = _cut_segments(self._segments, self.times)
+        self.states = self._kept(self._initial[None, :])
 
     def integrate(self) -> Integration:
         """Integrate from the initial state to the end, or to the first failure."""
         self.integrator.time = self._initial.dtype.type(0)
         self.integrator.state[:] = self._initial
         self.states, integration = over_segments(
-            self.times, self._segments, self._initial, self._advance
+            self.times, self._segments, self._kept(self._initial[None, :])[0], self._advance
         )
         return integration
+
+    def _kept(self, states: Array) -> Array:
+        """Return what is kept of the states at some samples."""
+        return states if self._keep is None else self._keep(states)
 
     def set_segment(self, segment: Segment) -> None:
         """Set the loads to those of a segment."""
@@ -269,7 +283,8 @@ class Propagation:
                 grid, callback=time_limit.step_callback()
             )
         message = time_limit.MESSAGE if time_limit.is_over() else failure(outcome)
-        return Advance(states[1 : 1 + len(times)], integrator.state, steps, None, message)
+        kept = self._kept(states[1 : 1 + len(times)])
+        return Advance(kept, integrator.state, steps, None, message)
 
     def observe(self) -> Trajectory:
         """Return the samples of the last run in doubles, with the work in J."""
@@ -279,6 +294,23 @@ class Propagation:
         ):
             states[:, -1] *= work_unit(self._scene)
         return samples.trajectory(self._scene, self.times, states)
+
+
+def _cut_segments(segments: Sequence[Segment], times: Array) -> list[Segment]:
+    """Return segments of the loads, cut after every `KEPT_ROWS` samples within them.
+
+    Parameters
+    ----------
+    segments : of the loads, in the order of time.
+    times : (n,) s of the samples.
+    """
+    parts = []
+    for segment in segments:
+        inside = times[(times > segment.start) & (times < segment.end)]
+        cuts = inside[KEPT_ROWS - 1 :: KEPT_ROWS].tolist()
+        for start, end in itertools.pairwise([segment.start, *cuts, segment.end]):
+            parts.append(replace(segment, start=start, end=end))
+    return parts
 
 
 def items(scene: Scene) -> list[BuiltItem]:
