@@ -691,7 +691,7 @@ class Record:
 
     @property
     def messages(self) -> list[str]:
-        """Return a message for each row; of a ladder of steps also for the omitted ones."""
+        """Return a message for each row."""
         return [
             str(text) for text in self.attributes.get("messages", [""] * len(self.arrays["status"]))
         ]
@@ -753,8 +753,9 @@ def _point_records(stored: StoredTable) -> Iterator[Record]:
                     facts[column] = value
         messages = [text_of(text) for text in arrays.pop("message")]
         if kind == "stability":  # without steps that were not needed
-            used = arrays["status"] != code_of("left_out")
-            arrays = {column: array[used] for column, array in arrays.items()}
+            is_used = arrays["status"] != code_of("left_out")
+            arrays = {column: array[is_used] for column, array in arrays.items()}
+            messages = [messages[step] for step in np.flatnonzero(is_used)]
         facts |= {
             "messages": messages,
             "method": known["method_name"],

@@ -17,7 +17,7 @@ from rotor_mbs.runs.hdf5 import CHARACTERS, Column
 from rotor_mbs.runs.layout import create_file
 from rotor_mbs.runs.merge import fit_file_to_request
 from rotor_mbs.runs.output_files import locked
-from rotor_mbs.runs.read import points_table
+from rotor_mbs.runs.read import points_table, read_records
 from rotor_mbs.runs.rows import RowLocation, Rows, blank_rows, characters, text_of
 from rotor_mbs.runs.table import TableFile
 from rotor_mbs.solution.status import STATUSES
@@ -222,6 +222,26 @@ def test_tables_of_other_studies_stay_beside_the_runs(tmp_path: Path) -> None:
     assert not changed.place("a", "stability").is_stored
     file = fit_file_to_request(path, [], replaced=[("stability", "paper/fig08", "lagrange/taylor")])
     assert "stability" not in file.groups
+
+
+def test_steps_that_a_ladder_omits_have_no_row_and_no_message(tmp_path: Path) -> None:
+    steps = {
+        "a": (0.5, "left_out", ""),
+        "b": (0.25, "inaccurate", "too long"),
+        "c": (0.1, "ok", ""),
+    }
+    points = []
+    for label, (step, _, _) in steps.items():
+        names = {"run": label, "scene": "paper/fig08", "method_name": "lagrange/taylor"}
+        points.append({**names, "step": step, "tolerance": np.nan})
+    file = fit_file_to_request(tmp_path / "s.h5", [points_table("stability", points)])
+    for label, (_, status, message) in steps.items():
+        place = file.place(label, "stability")
+        place.write(place.encode({"status": status, "message": message}))
+    (ladder,) = read_records(tmp_path / "s.h5", "stability")
+    assert ladder.arrays["step"].tolist() == [0.25, 0.1]
+    assert ladder.statuses == ["inaccurate", "ok"]
+    assert ladder.messages == ["too long", ""]
 
 
 @pytest.mark.parametrize("engine", ENGINES)
