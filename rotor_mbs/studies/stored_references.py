@@ -143,25 +143,26 @@ def _read_shipped(shipped: ShippedReference, scene: Scene) -> Solution:
     with open_results(shipped.path, only=[shipped.scene]) as results:
         stored = results.scenes[shipped.scene].reference
         assert stored is not None  # a file of references has one for each scene
-        facts = stored.attributes
+        facts, settings = stored.attributes, stored.settings
         arrays = {
             name: stored.array(name) for name in ("time", *REFERENCE_ARRAYS) if name in stored
         }
-        trajectory = rebuilt_reference(scene, arrays)
-        for values in (
-            trajectory.time,
-            trajectory.angles,
-            trajectory.rates,
-            *trajectory.quantities.values(),
-        ):
-            values.flags.writeable = False
-        is_complete = len(trajectory.time) == scene.samples
-        engine = Integration(
-            is_complete,
-            "" if is_complete else "the frozen reference ends early",
-            facts["time_reached"],
-            facts["steps"],
-            out_of_time=facts["status"] == "timed_out",
-        )
-        times = (facts["setup_time_s"], [facts["run_time_s"]], facts["output_time_s"])
-        return Solution(scene, REFERENCE, trajectory, engine, stored.settings, *times)
+    # Not in the block above, which would report an error of this code as damage of the file.
+    trajectory = rebuilt_reference(scene, arrays)
+    for values in (
+        trajectory.time,
+        trajectory.angles,
+        trajectory.rates,
+        *trajectory.quantities.values(),
+    ):
+        values.flags.writeable = False
+    is_complete = len(trajectory.time) == scene.samples
+    engine = Integration(
+        is_complete,
+        "" if is_complete else "the frozen reference ends early",
+        facts["time_reached"],
+        facts["steps"],
+        out_of_time=facts["status"] == "timed_out",
+    )
+    times = (facts["setup_time_s"], [facts["run_time_s"]], facts["output_time_s"])
+    return Solution(scene, REFERENCE, trajectory, engine, settings, *times)

@@ -7,6 +7,7 @@ import pytest
 from support.scenes import paper
 
 from rotor_mbs.models.lagrange.heyoka_adapter import is_available
+from rotor_mbs.studies import stored_references
 from rotor_mbs.studies.run import solve_judged
 from rotor_mbs.studies.stored_references import frozen_solution
 
@@ -33,6 +34,18 @@ def test_a_shipped_reference_is_read_once_and_cannot_be_changed() -> None:
     assert frozen_solution(paper("fig08")) is reference
     with pytest.raises(ValueError, match="read-only"):
         reference.trajectory.angles[0] = 0.0
+
+
+def test_an_error_of_this_code_is_not_called_damage_of_the_file(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def wrong(*_: object) -> None:
+        raise TypeError("a mistake")
+
+    monkeypatch.setattr(stored_references, "rebuilt_reference", wrong)
+    with pytest.raises(TypeError, match="a mistake"):
+        # Of another title, which no other test has read.
+        frozen_solution(paper("fig08", title="Not read before"))
 
 
 @pytest.mark.skipif(not is_available(), reason="heyoka is not installed")
