@@ -14,7 +14,7 @@ from support.scenes import MIXED, PAPER_BLADE, make_scene, paper
 
 from rotor_mbs.errors import InputError, MethodRefusal
 from rotor_mbs.methods.solve import solve
-from rotor_mbs.models.exudyn import methods, sensor_samples
+from rotor_mbs.models.exudyn import geometry, methods, sensor_samples
 
 POLE = replace(PAPER_BLADE, centre_of_mass=(0.0, 0.0, 15.42))
 BARE = replace(paper("fig08"), gravity=0.0, outputs=("angles", "rates"))
@@ -104,6 +104,14 @@ def test_work_is_integrated_along_the_path_where_it_is_asked_for_and_not_known(
     assert extrapolated.integrate().success
     assert (len(tree.system.rows("rates")) > scene.samples) is along_the_path
     assert (extrapolated.kept[-1].work != 0.0) is along_the_path
+
+
+@pytest.mark.parametrize("blades", [2, 3, 4, 6])
+def test_blades_that_balance_do_so_exactly(blades: int) -> None:
+    """Zero pitches stay zero only if the azimuths add up to zero without rounding."""
+    rotor = make_scene([0.0] * (1 + blades), [0.0] * (1 + blades), (PAPER_BLADE,) * blades)
+    total = sum(geometry.mounting(rotor, i) for i in range(blades))
+    assert total.tolist() == [[0.0, 0.0, 0.0], [0.0, blades, 0.0], [0.0, 0.0, 0.0]]
 
 
 def test_a_pitch_without_inertia_is_left_out() -> None:

@@ -13,6 +13,7 @@ from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import (
     ROTOR_TORQUE,
     LoadTable,
+    constant_value,
     intervals,
     rest_place,
     segments,
@@ -103,6 +104,11 @@ def test_each_load_of_a_scene_is_at_its_place(scene: Scene) -> None:
             assert loads[rest_place(pitch)] == pytest.approx(
                 value_at(rests[pitch], time), rel=4e-15, abs=4e-12
             )
+
+
+def test_a_load_that_changes_has_no_constant_value() -> None:
+    assert constant_value(CONSTANT) == 7.0
+    assert constant_value(RAMP) == 0.0
 
 
 def test_a_sample_on_a_jump_has_the_value_before_it() -> None:
