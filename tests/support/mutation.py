@@ -46,6 +46,8 @@ ROOT = Path(__file__).parents[2]
 # process that waits uses none.
 LIMIT_S = 20.0
 LIMIT_OF_WAITING_S = 3600.0
+# Tests that are named run whatever their mark, but for those that take minutes.
+PYTEST = ("-p", "no:cacheprovider", "-m", "not nightly and not browser")
 # Loaded once, for all forks.
 PACKAGES = (
     "exudyn",
@@ -764,7 +766,7 @@ def first_failure(
             for check in failed(judged(path)):
                 return Answer(f"check {check.name}: {' '.join(check.where)}", (scene, method))
         for paths in (_paths(likely_tests), _paths(tests)):
-            if paths and pytest.main(["-q", "-x", "-p", "no:cacheprovider", *paths], [first]):
+            if paths and pytest.main(["-q", "-x", *PYTEST, *paths], [first]):
                 detector = first.name if "::" in first.name else None
                 return Answer(f"test {first.name or 'not found'}", detector)
     return Answer("", None, first.durations)
@@ -821,7 +823,7 @@ def load(tests: tuple[str, ...]) -> None:
     stored_references = importlib.import_module("rotor_mbs.studies.stored_references")
     stored_references.shipped_reference("")
     with redirect_stdout(io.StringIO()):
-        pytest.main(["--collect-only", "-p", "no:cacheprovider", *_paths(tests)])
+        pytest.main(["--collect-only", *PYTEST, *_paths(tests)])
 
 
 def _paths(tests: Sequence[str]) -> list[str]:
