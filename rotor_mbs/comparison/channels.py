@@ -51,7 +51,7 @@ FREQUENCY_NAMES = {
     ),
 }  # fmt: skip
 LOAD_NAMES = tuple(load.name.replace("_", " ") for load in LOADS)
-# For the frame of a scene's loads: the other frames that the loads of data may have.
+# For each frame of a scene's loads, the other frames in which data may have these loads.
 # The frame "blade" turns with the pitch; "coned" is the blade's at zero pitch; "rotor" turns with
 # the rotor, y along the shaft and z across it (for a blade at its azimuth); "shaft" is the base
 # frame turned by the tilt.
@@ -83,8 +83,8 @@ class Channel:
     ----------
     name : in words.
     kind : of its unit, a key of `BASE_UNITS`.
-    column : of the matrix of angles, then rates, then loads; of the damped, then the undamped
-        frequencies; -1 for time and speed.
+    column : index of the channel among all angles, rates and loads, in this order; in a table of
+        modes among the damped, then the undamped frequencies; -1 for time and speed.
     frame : of a load, where it is not the scene's.
     sign : -1 for a name of another program, such as OpenFAST's, that means the opposite sign.
     """
@@ -203,7 +203,8 @@ class Entry(NamedTuple):
     ----------
     key : the name with a mark in place of the numbers: what all columns of the array have.
     numbers : in the name.
-    start, end : of the numbers in the name without its unit.
+    start, end : where the numbers, with their square brackets if they have any, stand in the name
+        without its unit.
     """
 
     key: str
@@ -217,7 +218,7 @@ def entry_of(name: str) -> Entry | None:
 
     Parameters
     ----------
-    name : of the column. Numbers in its last brackets count, else the last number.
+    name : of the column. Numbers in its last square brackets count, else the last number.
 
     Returns
     -------
@@ -256,7 +257,8 @@ def places_of(names: Sequence[str]) -> dict[str, Place]:
     """Return the places of numbered columns in their arrays, by name.
 
     Modelica and FMI count from 1, Python from 0: a dimension in which no column has the number 0
-    counts from 1. A dimension of length 1, as in `q[1,1]` ... `q[4,1]`, is left out.
+    counts from 1. A dimension of length 1 is left out if another one is longer, as in `q[1,1]` ...
+    `q[4,1]`.
 
     Parameters
     ----------
@@ -295,7 +297,8 @@ def channel_from_name(
     vector : number of columns of its array, 0 for a column of no array. `q[0]` is the rotor if the
         array has a column for each coordinate.
     known : `channels` or `mode_channels`.
-    indices : see `Place`; by default the numbers in the name, from 0 where they are in brackets.
+    indices : see `Place`; by default the numbers in the name, which count from 0 in square brackets
+        and from 1 elsewhere.
     """
     stripped = name.strip().strip("\"'").strip()
     inner = _DERIVATIVE.fullmatch(split_unit(stripped)[0])
@@ -304,7 +307,8 @@ def channel_from_name(
     channel = _channel_of_path(stripped, vector, known, indices)
     folder, _, last = split_unit(stripped)[0].rpartition("/")
     if channel is None and folder and last:
-        # A name such as "run/rates/rotor" is known by its last part, and the rate by another.
+        # The last part of a name such as "run/rates/rotor" tells the coordinate; an earlier part
+        # may tell that it is a rate.
         channel = _channel_of_path(last, vector, known, indices)
         parts = {_array_name(part) for part in folder.split("/")}
         if channel is not None and parts & set(_RATE_ARRAYS):
@@ -332,7 +336,7 @@ def arrays_of_other_length(
     ----------
     names : of all columns of the data.
     known : the channels that there may be.
-    kind : of the channels, "angle"; by default arrays of all kinds of coordinates count.
+    kind : "angle" or "rate", to find only arrays of this kind; by default both are found.
 
     Returns
     -------
@@ -425,8 +429,9 @@ def _channel_of_path(
     channel = _angle_or_rate(letters, numbers, known)
     if channel is None or entry is None:
         return channel
-    # An array of several rotor angles has the azimuths of the blades. An array of more pitches than
-    # blades may begin with the rotor.
+    # Several rotor angles in an array are the azimuths of the blades, and more pitches than blades
+    # may begin with the rotor: their columns are not identified. A number without brackets, as in
+    # "pitch_2", is that of the blade.
     blades = sum(other.kind == "angle" for other in known) - 1
     allowed = 1 if channel.name.startswith("rotor") else blades
     return (
@@ -460,7 +465,7 @@ def _mode_channel(
     ----------
     plain : the name without its unit, in lower case.
     known : `mode_channels`.
-    is_entry : whether the number stands in brackets, where it counts from 0.
+    is_entry : whether the number stands in square brackets, where it counts from 0.
     indices : see `Place`; None where the number in the name counts.
     """
     letters, numbers = re.sub(r"[^a-z]", "", plain), re.findall(r"\d+", plain)
@@ -474,7 +479,7 @@ def _mode_channel(
         elif is_entry:
             number += 1  # indices begin with 0
     for kind, names in FREQUENCY_NAMES.items():
-        if letters in names and plain != "mode":  # a column "mode" alone numbers them
+        if letters in names and plain != "mode":  # a column "mode" has the numbers of modes
             return _named(f"{kind} {number}", known)
     return None
 
@@ -499,7 +504,7 @@ def _array_channel(
     ----------
     array : name of the array, see `_array_name`.
     indices : of the column, from 0: one, or two of a load, blade and axis.
-    vector : how many columns the array has: one for each of its channels.
+    vector : how many columns the array has, which has to be the number of its channels.
     known : the channels that there are.
     """
     fitting = [channel for channel in known if array in _VECTORS.get(channel.kind, ())]

@@ -38,8 +38,8 @@ _LEFT_OF_FITTED = {1: 0.02, 2: 2e-3, 3: 2e-3}
 _ALIKE = 3.0  # times what the best explanation leaves
 _ALIKE_IN_ROUNDING = 1.05
 _QUICK = 3e-5  # relative error of the effect of another model, if computed by quick steps
-# Factor of the number of steps, so that this error holds also where the mass matrix is nearly
-# singular; and the number of steps to which the factor leads at most, to save time.
+# Fine steps are _MOST_FINE times as many, so that this error holds also where the mass matrix is
+# nearly singular. A search that has to be quick takes at most _FINE_STEPS of them in an interval.
 _MOST_FINE, _FINE_STEPS = 8, 32
 # A model that leaves a larger share of the defects by coarse steps is not tried by fine ones.
 _PERHAPS = 0.2
@@ -165,14 +165,16 @@ class DefectSearch:
         def left(model: RotorModel) -> float:
             return self._share(self._residual(model, self._fine))
 
-        # More is allowed here than an explanation may leave, to find those that are alike to one.
+        # An explanation leaves at most _LEFT. Hypotheses that leave up to _CERTAIN times as much
+        # are kept, too: if there are any, the explanation is not certainly the cause.
         hypotheses = rotor_hypotheses(self._scene)
         explained = list(explanations(hypotheses, left, _CERTAIN * _LEFT))
         if not _least(explained) <= _LEFT:
             explained = self._parameter_sets()
         if not _least(explained) <= _LEFT:
             return []
-        # What the quick steps leave of the right one cannot be distinguished from nothing.
+        # A right model leaves an error of the quick steps. What is left below this error does not
+        # show which model is better.
         alike = closest(explained, _CERTAIN, 0.1 * _QUICK)
         return [explanation.text for explanation in alike]
 
@@ -237,12 +239,12 @@ class DefectSearch:
                     model.scene, *intervals, steps * self._steps, model.accelerations()
                 )
             else:
-                # The change below is then the method's own error, by comparison with fine steps of
-                # the closed form. Their errors do not cancel in it: the method takes other steps.
+                # `change` below is then the error of the method against the closed form. The steps
+                # of the two differ, so that errors of the closed form's steps remain in it.
                 ends = quick_ends(model.scene, *intervals, model.steps, step=model.method)
         except RotorError:
             return np.full_like(self._values, np.inf)
-        # The difference of two models by the same steps, in which the errors of the steps cancel.
+        # Two models are integrated by the same steps, whose errors cancel in the difference.
         if steps not in self._ends_of_scene:
             self._ends_of_scene[steps] = quick_ends(self._scene, *intervals, steps * self._steps)
         change = (ends - self._ends_of_scene[steps]).T
@@ -261,14 +263,14 @@ class DefectSearch:
         return float(np.linalg.norm(residual * self._weights)) / (before or 1.0)
 
     def _left_by(self, model: RotorModel) -> float:
-        """Return the share of the defects that a model leaves; infinite where it is too much.
-
-        Where the defects are within rounding, no single one is too large.
-        """
+        """Return the share of the defects that a model leaves; infinite where it is too much."""
         return self._left_at_most(model, self._allowed)
 
     def _left_at_most(self, model: RotorModel, allowed: float) -> float:
-        """Return the share that a model leaves; infinite if a defect stays above `allowed`, rad."""
+        """Return the share that a model leaves; infinite if a defect stays above `allowed`, rad.
+
+        If all defects of the data are within rounding, the share is always returned.
+        """
         residual = self._residual(model, self._fine)
         if not self._is_rounding and not self._largest_left(residual) <= allowed:
             return math.inf
@@ -293,7 +295,7 @@ class DefectSearch:
     # Parameters
 
     def _parameter_sets(self) -> list[Explanation[RotorModel]]:
-        """Search for the smallest sets of parameters that explain the defects.
+        """Search for small sets of parameters that explain the defects.
 
         The signature of a parameter is the derivative of the defects by it. Least squares over the
         signatures of a set say how much of the defects it may explain; the best sets are fitted.
@@ -301,7 +303,8 @@ class DefectSearch:
         Returns
         -------
         list of Explanation
-            Of the smallest number of parameters that explains the defects; empty if none does.
+            Sets of the smallest number of parameters that explains the defects, or of a larger one
+            that explains them far better; empty if none does.
         """
         candidates, signatures = self._signatures()
         if not candidates:
@@ -317,14 +320,16 @@ class DefectSearch:
             if not len(sets):
                 break
             matrices = cosines[sets[:, :, None], sets[:, None, :]]
-            # Parameters with one signature, such as a mass and gravity, cannot be distinguished.
+            # Parameters with the same signature cannot be distinguished: a mass and gravity may
+            # have the same.
             is_independent = np.linalg.det(matrices) > _INDEPENDENT
             sets, matrices = sets[is_independent], matrices[is_independent]
             sides = projections[sets]
             amounts = np.linalg.solve(matrices, sides[..., None])[..., 0]
-            squares = (sides * amounts).sum(axis=1)  # of the defects, that the set explains
-            # The signature holds for small changes: a single parameter that is far off may have
-            # another, and is fitted all the same.
+            # The part of `total` that a set explains.
+            squares = (sides * amounts).sum(axis=1)
+            # Signatures are those of small changes. A single parameter may be far off, where its
+            # signature is another: it is fitted even if this one explains little.
             if count > 1:
                 is_enough = squares > (1.0 - _LEFT_OF_SETS**2) * total
                 sets, squares = sets[is_enough], squares[is_enough]
@@ -473,7 +478,7 @@ def _has_kink(judged: JudgedDefects) -> NDArray[np.bool_]:
     time = judged.defects.time
     has_kink = np.zeros(len(time) - 1, dtype=bool)
     for kink in judged.scene.kink_times:
-        # Not at its ends, where each interval has its own side of the kink.
+        # A kink at an end of an interval is not inside: the loads in the interval are then smooth.
         is_after_begin = time[:-1] < kink * (1.0 - 1e-9)
         is_before_end = kink * (1.0 + 1e-9) < time[1:]
         has_kink |= is_after_begin & is_before_end

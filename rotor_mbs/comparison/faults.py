@@ -27,12 +27,16 @@ _MAX_STEPS = 512  # of Runge and Kutta in an interval
 _STANDS_OUT = 30.0  # times the median of the defects
 _FAINT = 0.02  # of the largest defect: smaller ones are not reported beside it
 _EVERYWHERE = 0.6  # of the intervals
-# In this share of the other intervals, defects are at most this share of the largest defect.
+# In the share _MOST of the other intervals, defects are within the tolerance, or at most the share
+# _OF_OTHERS of the largest defect.
 _MOST, _OF_OTHERS = 0.9, 1e-3
-_EDGE = 0.1  # share of the faulty intervals' median that the median beside them may reach
-_GAP = 6  # intervals: faults that are nearer to each other are one
+# A fault has edges if the median defect of the intervals next to faulty ones is at most this share
+# of the median of the faulty ones.
+_EDGE = 0.1
+_GAP = 6  # intervals: faulty ones that are at most this far apart are one group
 _AT_END = 3  # intervals
-# Share of the largest defect: if usual defects are larger, those at the ends have the same cause.
+# If the median of all defects is more than this share of the largest defect, large defects at the
+# ends of the data have the same cause as the others, and are no faults.
 _OF_ENDS = 1e-3
 _PARALLEL = 0.995  # cosine
 _NEARLY = 0.05
@@ -57,8 +61,8 @@ def faults_in_time(judged: JudgedDefects) -> list[str]:
     -------
     list of str
         The first `_MAX_NAMED` groups of faults, in words, and how many more there are. Empty where
-        most intervals are wrong, no defect is more than the tolerance, or the defects do not end
-        abruptly.
+        most intervals are wrong, no defect is more than the tolerance, the defects do not end
+        abruptly, or the other intervals have errors, too.
     """
     excess = judged.excess
     if judged.largest <= judged.tolerance:
@@ -194,8 +198,8 @@ def _wrong_row(judged: JudgedDefects, group: NDArray[np.int64]) -> str:
         at = f"at t = {defects.time[last + 1]:.6g} s"
         return f"a row {event}, or times {clock} by less than an interval, {at}"
     if len(group) == 2 and last == first + 1:
-        # The second interval starts at the wrong row, and ends at a right one: its defect is the
-        # row's error, carried over the interval, with the opposite sign.
+        # The second interval starts at the wrong row, and ends at a right one: its defect is that
+        # of the first interval, carried over the second, with the opposite sign.
         carried = defects.transitions[first + 1] @ (values[0] * units) / units
         if _cosine(values[1], -carried) >= _PARALLEL:
             row = f"row {first + 2}, t = {defects.time[first + 1]:.6g} s"
@@ -258,7 +262,7 @@ def _state_rate(judged: JudgedDefects, row: int) -> Array:
 
     Parameters
     ----------
-    judged : the defects of the data, in whose units rates count as rad.
+    judged : the defects of the data, whose `units` convert rates to rad.
     row : number of the interval.
     """
     states, time = judged.defects.states, judged.defects.time

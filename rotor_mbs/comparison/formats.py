@@ -6,8 +6,9 @@ of netCDF and HDF5 as the CF conventions say. The headers of text are read here,
 OpenFAST and Exudyn.
 
 A file may be damaged, or made to harm: what it claims to hold is bounded before it is read, and the
-process has limits of memory and time for what no check foresees. No regular expression here takes
-longer than a constant times the length of its text.
+process has limits of memory and time for what no check foresees. The time that a regular expression
+takes here is proportional to the length of its text, except that of `_EXUDYN_SOLUTION` in a text
+made to slow it down, where the limit of time ends it.
 """
 
 from __future__ import annotations
@@ -193,6 +194,7 @@ def read_columns(path: Path, group: str, scene: str) -> DataTable:
     del content
     if _is_json(text):
         table = table_of(source, *_json(text))
+        # Where JSON has NaN, a missing number is not certainly a null.
         return table if "NaN" in text else _with_nulls(table)
     return _read_text(source, text)
 
@@ -327,7 +329,7 @@ def _all_parts(path: str, value: Any) -> Iterator[tuple[str, Any]]:
         return
     if isinstance(value, np.ndarray) and value.dtype.kind == "O":
         value = list(value.flat)
-    if isinstance(value, list) and any(np.ndim(_sample(part)) for part in value[:_MAX_PARTS]):
+    if isinstance(value, list) and any(_has_parts(part) for part in value[:_MAX_PARTS]):
         if all(isinstance(part, list) for part in value):
             yield path, value  # rows of numbers, as JSON has them
             return
@@ -337,9 +339,9 @@ def _all_parts(path: str, value: Any) -> Iterator[tuple[str, Any]]:
     yield path, value
 
 
-def _sample(value: Any) -> Any:
-    """Return [0] for a value that has parts, 0 for any other: `np.ndim` tells them apart."""
-    return [0] if isinstance(value, list | dict | np.ndarray) and len(value) else 0
+def _has_parts(value: Any) -> bool:
+    """Return whether a value is a list, mapping or array that is not empty."""
+    return isinstance(value, list | dict | np.ndarray) and len(value) > 0
 
 
 def _signals(prefix: str, signals: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
@@ -366,7 +368,8 @@ def _netcdf_3(path: Path) -> tuple[Arrays, Mapping[str, Mapping[str, Any]]]:
     Returns
     -------
     arrays, attributes : dict
-        By name of the variable its numbers as they are stored, and its attributes by their names.
+        The numbers of each variable as they are stored, by the variable's name; and its
+        attributes, by the variable's name, then by their own.
 
     Raises
     ------
@@ -440,8 +443,8 @@ def _hdf5(path: Path, group: str, scene: str) -> DataTable:
 def _decoded(source: str, arrays: Arrays, attributes: Mapping[str, Mapping[str, Any]]) -> DataTable:
     """Return stored arrays as columns, unpacked as the CF conventions say.
 
-    Scales and offsets are applied, missing values become NaN; times stay numbers. An array in which
-    packing has overflown is left out.
+    Scales and offsets are applied, missing values become NaN; times stay numbers. An array of
+    integers of 32 or 64 bits in which packing has overflown is left out.
 
     Parameters
     ----------
@@ -552,8 +555,8 @@ def _json(text: str) -> tuple[Arrays, Units]:
     Parameters
     ----------
     text : content of the file. The forms of a table are: a list of objects, one for each row; an
-        object on each line; {"columns": ..., "data": ...}; an object with an object for each
-        column, or for each row.
+        object on each line; {"columns": ..., "data": ...}; {"schema": ..., "data": ...}; an object
+        with an object for each column, or for each row.
 
     Returns
     -------
@@ -648,7 +651,7 @@ def _read_text(source: str, text: str) -> DataTable:
     plain = [line for line in head if not line.startswith(_COMMENT)]
     names = _names(source, plain or comments, len(columns), divider)
     named: dict[str, DataColumn] = {}
-    headers: dict[str, str] = {}  # of columns whose name an earlier one has
+    headers: dict[str, str] = {}  # of columns with a name that occurs before, see `DataTable`
     left_out: dict[str, LeftOut] = dict(closing)
     repeats: dict[str, int] = {}
     for number, ((name, unit), values) in enumerate(zip(names, columns, strict=True)):
@@ -759,8 +762,8 @@ def _exudyn(
     elif written is not None:
         counts = [int(count) for count in written[1].split(",")[: len(_EXUDYN_KINDS)]]
         if sum(counts) != values.shape[1] - 1:
-            problem = f"{values.shape[1] - 1} columns beside the time, {sum(counts)} in its head"
-            raise InputError(f"{source}: {problem}; allowed: as many")
+            problem = f"{values.shape[1] - 1} columns beside the time"
+            raise InputError(f"{source}: {problem}; allowed: {sum(counts)}, as its head says")
         begin = 1
         for kind, count in zip(_EXUDYN_KINDS, counts, strict=False):
             if count:
@@ -788,7 +791,8 @@ def _first_row(source: str, lines: Lines) -> tuple[int, str | None]:
     InputError
         If there is no row of numbers; the message has the line with the most numbers.
     """
-    most_numbers, nearest = 0, ""  # of the row that comes nearest, and what in it is no number
+    # Of the line with the most numbers: how many, and the text that keeps it from being a row.
+    most_numbers, nearest = 0, ""
     for place, (number, line) in enumerate(lines):
         if line.startswith(_COMMENT):
             continue
@@ -796,8 +800,8 @@ def _first_row(source: str, lines: Lines) -> tuple[int, str | None]:
             fields = _fields(line, divider)
             numbers, others = _kinds_of_fields(fields, divider)
             if len(fields) > 1 and numbers and not others:
-                # An earlier line that begins with a number, as a row does with its time, is no
-                # header but a row, which has a text in place of another number.
+                # An earlier line may be a row with a text in place of a number. It is a row, and
+                # no header, if its first field is a number, such as the time.
                 with_texts = _first_row_with_texts(lines[: place + 1])
                 if with_texts is not None:
                     first = _fields(lines[with_texts[0]][1], with_texts[1])[0]
@@ -1019,7 +1023,8 @@ def _names(
     Raises
     ------
     InputError
-        If there is no line above the numbers, or it has another number of names than columns.
+        If there is no line above the numbers, or the number of names is not that of the columns;
+        the last name may be missing unless blanks divide the columns.
     """
     if not head:
         allowed = "a line such as: time [s],rotor [rad]"

@@ -50,11 +50,12 @@ from rotor_mbs.solution.metrics import horizon, horizon_samples
 from rotor_mbs.solution.status import OK_ERROR
 from rotor_mbs.solution.trajectory import Array, Trajectory
 
-_TIME_ROUNDING = 1e-9  # of the duration, by which times that are sums of steps may exceed it
+_TIME_ROUNDING = 1e-9  # share of the duration by which rounding may make a time exceed it
 _MIN_ROWS = 3
 _STAGES = 4  # reference, interval defects, search for causes, loads
 _SAME_START = 1e-3  # rad, rad/s: starts that differ by more are another start
-_LEFT_OF_SMALL_ERRORS = 0.02  # share that a cause may leave of errors within the tolerance
+# A cause explains errors within the tolerance if at most this share of them is left.
+_LEFT_OF_SMALL_ERRORS = 0.02
 _MAX_GAP = 1.5  # largest number of intervals without rows at the start or end of the motion
 
 
@@ -64,7 +65,7 @@ class ReferencedRows:
 
     Attributes
     ----------
-    data : rows within the scene's duration, with the turns of the reference where they are wrapped.
+    data : rows within the scene's duration; wrapped channels begin in the turn of the reference.
     compared : those of them that the reference reaches.
     exact : reference at the times of the data and at the scene's samples.
     places : (rows,) rows of `exact` at the times of the data.
@@ -346,7 +347,8 @@ def _errors_of(
     sums = _largest_sums(scene, rows.defects)
     beyond_digits = _beyond_digits(scene, tolerance, rows.defects)
     # Errors are divided by the growth of an initial error. Faults that are below the tolerance in
-    # each interval may add up to an error above it: where errors do not grow, this shows it.
+    # each interval may add up to an error above it. Where the growth is small, the quotient is
+    # above the tolerance, too.
     exact = rows.exact
     carried = carried_errors(exact.trajectory, exact.growth, exact.units)
     carried = carried[rows.places][:, data.columns]
