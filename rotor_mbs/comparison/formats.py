@@ -7,8 +7,7 @@ OpenFAST and Exudyn.
 
 A file may be damaged, or made to harm: what it claims to hold is bounded before it is read, and the
 process has limits of memory and time for what no check foresees. The time that a regular expression
-takes here is proportional to the length of its text, except that of `_EXUDYN_SOLUTION` in a text
-made to slow it down, where the limit of time ends it.
+takes here is proportional to the length of its text.
 """
 
 from __future__ import annotations
@@ -72,7 +71,7 @@ _DIVIDERS = (";", "\t", ",", None)  # None: blanks
 _OPENFAST_HEAD = re.compile(r"^Predictions were generated .{0,80}\b(?:Open)?FAST\b")
 _EXUDYN = re.compile(r"OutputVariableType = (\w+)")
 # Exudyn's solution file: how many columns it has of each kind, behind the time.
-_EXUDYN_SOLUTION = re.compile(r"written coordinates \[[^\]]*\] = \[([\d, ]+)\]")
+_EXUDYN_SOLUTION = re.compile(r"written coordinates \[[^\][]*\] = \[([\d, ]+)\]")
 _EXUDYN_KINDS = (
     "coordinates", "coordinates_t", "accelerations", "ode1", "ode1_t", "algebraic", "data",
 )  # fmt: skip

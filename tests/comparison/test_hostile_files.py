@@ -69,6 +69,15 @@ def test_a_header_of_marks_takes_time_in_proportion_to_its_length(
     refusal_of(tmp_path / "data.txt")
 
 
+def test_a_comment_of_unfinished_lists_takes_time_in_proportion_to_its_length(
+    tmp_path: Path,
+) -> None:
+    """200,000 lists that Exudyn's head could begin: 4e11 steps if each is read to the end."""
+    comments = "#Exudyn\n" + "# written coordinates [\n" * 200_000
+    (tmp_path / "data.txt").write_text(f"{comments}{ROWS.replace(',', ' ')}")
+    refusal_of(tmp_path / "data.txt")
+
+
 def test_long_names_are_cut_and_stay_distinct(tmp_path: Path) -> None:
     """The csv module's own limit is 131,072 characters."""
     long = "n" * 200_000
