@@ -21,8 +21,9 @@ from support.stored import Made, rotor, store
 import rotor_mbs as rm
 from rotor_mbs.models.lagrange.heyoka_adapter import is_available
 from rotor_mbs.runs import progress, table, untrusted
-from rotor_mbs.runs.hdf5 import Content
+from rotor_mbs.runs.hdf5 import StoredGroup
 from rotor_mbs.runs.runner import RunOutcome
+from rotor_mbs.runs.trailer import Trailer
 from rotor_mbs.studies import check
 
 SHORT = {"duration": 0.5, "samples": 26}
@@ -196,16 +197,18 @@ def test_a_file_is_opened_once_and_a_run_reads_its_scene_alone(
     files: dict[str, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     opened: list[list[str]] = []
-    read = table.read_content
+    read = table.read_groups
 
-    def counted(path: Path, kinds: Collection[str], only: Collection[str] | None = None) -> Content:
-        content = read(path, kinds, only)
-        opened.append([*content.groups])
-        return content
+    def counted(
+        path: Path, kinds: Collection[str], only: Collection[str] | None = None
+    ) -> tuple[dict[str, StoredGroup], Trailer]:
+        groups, trailer = read(path, kinds, only)
+        opened.append([name for name in groups if name])
+        return groups, trailer
 
     path = Path(shutil.copy(files["many"], tmp_path / "many.h5"))
     os.utime(path, (1e9, 1e9))  # long ago
-    monkeypatch.setattr(table, "read_content", counted)
+    monkeypatch.setattr(table, "read_groups", counted)
     runs = rm.open(path)
     assert [groups for groups in opened if groups] == [["runs"]]
     opened.clear()

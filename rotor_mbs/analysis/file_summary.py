@@ -13,10 +13,10 @@ from rotor_mbs.analysis.modes import mode_summary, read_modes
 from rotor_mbs.analysis.text_tables import TextTable, bench_table, method_table, sweep_parameters
 from rotor_mbs.methods.catalogue import REFERENCE, is_corrected
 from rotor_mbs.runs.design import MISSING
-from rotor_mbs.runs.hdf5 import read_content, reading
+from rotor_mbs.runs.hdf5 import reading
 from rotor_mbs.runs.read import StoredScene, open_results, read_records
 from rotor_mbs.runs.sweeps import StoredSweep
-from rotor_mbs.runs.table import parsed
+from rotor_mbs.runs.table import TableFile, parsed
 from rotor_mbs.runs.trailer import COMPARISON, MODES, RESULTS, SWEEP, read_trailer, refuse_split
 from rotor_mbs.runs.versions import made_with
 from rotor_mbs.scenario.keys import counted
@@ -228,7 +228,7 @@ def _sweep(path: Path) -> FileSummary:
 def _modes(path: Path) -> FileSummary:
     """Return the summary of a file of modes, with the modes of each scene as text."""
     found = read_modes(path)
-    summary = FileSummary(path, MODES, read_content(path, ()).attributes, list(found))
+    summary = FileSummary(path, MODES, TableFile(path, ()).attributes, list(found))
     summary.labels = {name: modes.label for name, modes in found.items()}
     summary.methods = _unique(
         model for modes in found.values() for model in (*modes.rest, *modes.rotation)
@@ -250,7 +250,7 @@ def _comparison(path: Path) -> FileSummary:
     summary = FileSummary(
         path,
         COMPARISON,
-        read_content(path, ()).attributes,
+        TableFile(path, ()).attributes,
         _unique(record.scene for record in records),
     )
     summary.statuses = dict(Counter(str(record.attributes["status"]) for record in records))

@@ -58,78 +58,51 @@ class Column(NamedTuple):
     attributes: Mapping[str, Any] = {}
 
 
-class StoredRows(NamedTuple):
-    """Location of a computed column in a file.
-
-    Attributes
-    ----------
-    shape : of the column.
-    offset : in the file, bytes.
-    is_in_place : whether the trailer has the same offset and length.
-    """
-
-    shape: tuple[int, ...]
-    offset: int
-    is_in_place: bool
-
-
 class StoredGroup(NamedTuple):
-    """A group of a file.
+    """A group of a file without its rows.
 
     Attributes
     ----------
     attributes : of the group.
     columns : descriptions of its datasets, by name.
     values : of the known columns and scales, which are datasets that the trailer does not have.
-    rows : locations of the computed columns, which are the datasets that the trailer has.
     characters : length of each computed text.
     """
 
-    attributes: Mapping[str, Any]
+    attributes: dict[str, Any]
     columns: Mapping[str, Column]
     values: Mapping[str, NDArray[Any]]
-    rows: Mapping[str, StoredRows]
     characters: int
 
 
-class Content(NamedTuple):
-    """A file without its rows.
-
-    Attributes
-    ----------
-    attributes : of the file.
-    names : of all its groups.
-    groups : those that were read, by name.
-    inode : of the file.
-    """
-
-    attributes: dict[str, Any]
-    names: list[str]
-    groups: dict[str, StoredGroup]
-    inode: int
-
-
-def read_content(
+def read_groups(
     path: Path, kinds: Collection[str], only: Collection[str] | None = None
-) -> Content:
+) -> tuple[dict[str, StoredGroup], Trailer]:
     """Read a file of this program, in the worker process unless the file is trusted.
 
     Parameters
     ----------
     path : the file.
-    kinds : of files whose groups are read; for a file of another kind there are none.
-    only : names of the groups to read, by default all.
+    kinds : of files whose groups are read; of a file of another kind it is the root alone.
+    only : names of the groups to read beside the root, by default all.
+
+    Returns
+    -------
+    dict of StoredGroup
+        By name; "" is the root.
+    Trailer
+        Of the file, with all its groups and the locations of the computed columns.
 
     Raises
     ------
     StoreError
         If it is missing, damaged or another program's, or cannot be read within limits.
     """
-    return read_in_worker(path, _read_content, (kinds, only))
+    return read_in_worker(path, _read_groups, (kinds, only))
 
 
 def read_arrays(path: Path, group: str, names: Collection[str]) -> dict[str, NDArray[Any]]:
-    """Read a few arrays of a file of this program, as `read_content` reads whole groups.
+    """Read a few arrays of a file of this program, as `read_groups` reads whole groups.
 
     Parameters
     ----------
@@ -139,7 +112,7 @@ def read_arrays(path: Path, group: str, names: Collection[str]) -> dict[str, NDA
     Raises
     ------
     StoreError
-        As `read_content`, or if one of them is missing.
+        As `read_groups`, or if one of them is missing.
     """
     return read_in_worker(path, _read_arrays, (group, names))
 
@@ -150,29 +123,34 @@ def _read_arrays(path: Path, asked: tuple[str, Collection[str]]) -> dict[str, ND
         return {name: values_of(member(group_at(file, group), name)) for name in names}
 
 
-def _read_content(path: Path, selection: tuple[Collection[str], Collection[str] | None]) -> Content:
-    """Read a file in this process; `selection` is (kinds, only), see `read_content`."""
+def _read_groups(
+    path: Path, selection: tuple[Collection[str], Collection[str] | None]
+) -> tuple[dict[str, StoredGroup], Trailer]:
+    """Read a file in this process; `selection` is (kinds, only), see `read_groups`."""
     kinds, only = selection
     with open_file(path) as (file, trailer), reading(path):
-        names = list(trailer.groups) if trailer.kind in kinds else []
-        groups = {}
-        for name in names:
-            if only is None or name in only:
+        groups = {"": _read_group(file, trailer.groups.get("", {}))}
+        for name in trailer.groups if trailer.kind in kinds else ():
+            if name and (only is None or name in only):
                 groups[name] = _read_group(group_at(file, name), trailer.groups[name])
-        return Content(attributes_of(file), names, groups, trailer.inode)
+        return groups, trailer
 
 
 def _read_group(group: Any, regions: Mapping[str, tuple[int, int]]) -> StoredGroup:
-    """Read a group, but of the columns in `regions` only where they are."""
+    """Read a group, but not the columns in `regions`, which must be where these say."""
     datasets = datasets_of(group)
     columns = columns_of(datasets)
     values = {name: values_of(dataset) for name, dataset in datasets.items() if name not in regions}
-    rows = {}
+    characters = len(group[CHARACTERS]) if CHARACTERS in group else 0
+    lengths = {name: len(scale) for name, scale in values.items() if scale.ndim}
+    lengths[CHARACTERS] = characters
     for name, region in regions.items():
         dataset = datasets[name]
-        rows[name] = StoredRows(dataset.shape, region[0], place_of(dataset) == tuple(region))
-    characters = len(group[CHARACTERS]) if CHARACTERS in group else 0
-    return StoredGroup(attributes_of(group), columns, values, rows, characters)
+        shape = tuple(lengths[dimension] for dimension in columns[name].dimensions)
+        if dataset.shape != shape or place_of(dataset) != tuple(region):
+            place = f"{group.file.filename}: {group.name.strip('/')}/{name}"
+            raise StoreError(f"{place} has shape {dataset.shape} of {dataset.dtype}; damaged")
+    return StoredGroup(attributes_of(group), columns, values, characters)
 
 
 @contextmanager

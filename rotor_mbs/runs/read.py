@@ -41,7 +41,7 @@ from rotor_mbs.runs.design import (
     TableSpec,
     known_columns,
 )
-from rotor_mbs.runs.hdf5 import ATTEMPTS, Column, StoredGroup, read_content, reading
+from rotor_mbs.runs.hdf5 import ATTEMPTS, Column, StoredGroup, read_groups, reading
 from rotor_mbs.runs.layout import new_file, new_group, put, put_attributes
 from rotor_mbs.runs.output_files import locked
 from rotor_mbs.runs.rows import RowLocation, Rows, checksums, text_of
@@ -720,8 +720,9 @@ def read_records(path: Path, kind: str) -> list[Record]:
         tables = TableFile(path, [kind]).tables.values()
         with reading(path):
             return [record for table in tables for record in _point_records(table)]
+    groups, _ = read_groups(path, [kind])
     with reading(path):
-        return [_record(name, group) for name, group in read_content(path, [kind]).groups.items()]
+        return [_record(name, group) for name, group in groups.items() if name]
 
 
 def _point_records(stored: StoredTable) -> Iterator[Record]:

@@ -43,9 +43,9 @@ from rotor_mbs.runs.design import (
     STATUS_COPIES,
     TableSpec,
 )
-from rotor_mbs.runs.hdf5 import Column, StoredGroup, read_content, reading
+from rotor_mbs.runs.hdf5 import Column, StoredGroup, read_groups, reading
 from rotor_mbs.runs.rows import RowLocation, blank_rows
-from rotor_mbs.runs.trailer import RESULTS, SWEEP
+from rotor_mbs.runs.trailer import RESULTS, SWEEP, Trailer
 
 # Attribute of a sweep's file: a hash of its whole design.
 IDENTITY = "sweep_identity"
@@ -245,12 +245,14 @@ class TableFile:
             only = missing if only is None else missing & set(only)
             if not only:
                 return
-        content = read_content(self.path, (RESULTS, SWEEP), only)
-        self.attributes = content.attributes
-        self.groups = content.names
+        kinds = RESULTS, SWEEP
+        groups, trailer = read_groups(self.path, kinds, only)
+        self.attributes = groups[""].attributes
+        self.groups = list(trailer.groups) if trailer.kind in kinds else []
         with reading(self.path):
-            for name, stored in content.groups.items():
-                self.tables[name] = _table(self.path, name, stored, content.inode)
+            for name in self.groups:
+                if only is None or name in only:
+                    self.tables[name] = _table(self.path, name, groups[name], trailer)
             self._check_runs()
 
     def copy(self) -> TableFile:
@@ -347,12 +349,12 @@ def opened_tables(path: Path, only: Collection[str] | None = None) -> TableFile:
     return file.copy()
 
 
-def _table(path: Path, group: str, stored: StoredGroup, inode: int) -> StoredTable:
+def _table(path: Path, group: str, stored: StoredGroup, trailer: Trailer) -> StoredTable:
     """Return the table of a group.
 
     Parameters
     ----------
-    path, inode : the file.
+    path, trailer : the file.
     group : name of the group.
     stored : what was read of it.
 
@@ -362,30 +364,30 @@ def _table(path: Path, group: str, stored: StoredGroup, inode: int) -> StoredTab
         If it is no table, or differs from what was laid out.
     """
     known = {name: (stored.columns[name], values) for name, values in stored.values.items()}
-    computed = {name: stored.columns[name] for name in stored.rows}
-    offsets = {name: rows.offset for name, rows in stored.rows.items()}
     _, runs = known.pop("run")
+    regions = trailer.groups[group]
     table = StoredTable(
         group=group,
         runs=runs,
         known=known,
-        computed=computed,
+        computed={name: stored.columns[name] for name in regions},
         attributes=stored.attributes,
         characters=stored.characters,
         path=path,
-        inode=inode,
-        offsets=offsets,
+        inode=trailer.inode,
+        offsets={name: offset for name, (offset, _) in regions.items()},
     )
-    for name, column in computed.items():
-        kind, shape, rows = np.dtype(column.kind), table.shape(name), stored.rows[name]
-        is_wrong = rows.shape != shape or kind.kind not in "fiuS" or not rows.is_in_place
+    for name, column in table.computed.items():
+        kind = np.dtype(column.kind)
+        is_wrong = kind.kind not in "fiuS"
         if name in COLUMNS and name not in ONCE_A_SCENE:
             usual = COLUMNS[name]
             is_wrong = (
                 is_wrong or kind != np.dtype(usual.kind) or column.dimensions != usual.dimensions
             )
         if is_wrong:
-            raise StoreError(f"{path}: {group}/{name} has shape {rows.shape} of {kind}; damaged")
+            shape = table.shape(name)
+            raise StoreError(f"{path}: {group}/{name} has shape {shape} of {kind}; damaged")
     _check_table(table)
     return table
 

@@ -168,7 +168,7 @@ def test_the_tables_of_a_new_file_are_known_without_reading_it(
 ) -> None:
     path = tmp_path / "r.h5"
     with monkeypatch.context() as patch:
-        patch.setattr("rotor_mbs.runs.table.read_content", None)
+        patch.setattr("rotor_mbs.runs.table.read_groups", None)
         laid = fit_file_to_request(path, results_tables(_asked("reference", "lagrange/taylor")))
     read = TableFile(path)
     assert laid.groups == read.groups
