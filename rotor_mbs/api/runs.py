@@ -202,7 +202,7 @@ def run(
     folder = TemporaryFolder()
     path = folder.path / "runs.h5"
     with progress_of_call(progress) as on_progress:
-        report = run_scenes(
+        outcomes = run_scenes(
             [scene],
             chosen,
             path,
@@ -211,7 +211,7 @@ def run(
             settings=settings,
             on_progress=on_progress,
         )
-    refuse_losses([f"{run.label}: {run.message}" for run in report.not_computed])
+    refuse_losses([f"{run.label}: {run.message}" for run in outcomes if not run.is_stored])
     return Results(path, scene.name, _folder=folder)
 
 

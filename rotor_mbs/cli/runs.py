@@ -50,14 +50,14 @@ def run(arguments: argparse.Namespace) -> int:
     if not scenes:
         raise InputError(map(str, refused))
     with ProgressLine() as progress:
-        report = run_scenes(
+        outcomes = run_scenes(
             scenes, methods, arguments.output, workers=arguments.jobs, timeout_s=arguments.timeout,
             settings=settings, on_progress=progress,
         )  # fmt: skip
     with open_results(arguments.output) as results:
         table = table_of_runs(results.scenes, methods)
     print_table(table)
-    return print_summary(report, arguments.output, refused)
+    return print_summary(outcomes, arguments.output, refused)
 
 
 def reproduce(arguments: argparse.Namespace) -> int:
@@ -110,21 +110,21 @@ def _reproduce(arguments: argparse.Namespace, results: Path, pages: Path) -> tup
     from rotor_mbs.studies.reproduce import summary_of
 
     with local_pool(arguments.jobs, load_code) as pool, ProgressLine() as progress:
-        report, refused = reproduce_paper(
+        outcomes, refused = reproduce_paper(
             results, workers=pool, timeout_s=arguments.timeout, on_progress=progress
         )
         from rotor_mbs.report.build import write_report  # late: `reproduce` alone needs it
 
         write_report(results, pages, pool, partial(progress.stage, "pages and figures"))
-    return print_summary(report, results, refused), summary_of(results)
+    return print_summary(outcomes, results, refused), summary_of(results)
 
 
 def reference(arguments: argparse.Namespace) -> int:
     """Compute the references of scenes, also where a reference is shipped."""
     scenes = find_scenes(arguments.scenes)
     with ProgressLine() as progress:
-        report = run_scenes(
+        outcomes = run_scenes(
             scenes, {scene.name: () for scene in scenes}, arguments.output, workers=arguments.jobs,
             timeout_s=arguments.timeout, use_frozen=False, on_progress=progress,
         )  # fmt: skip
-    return print_summary(report, arguments.output)
+    return print_summary(outcomes, arguments.output)

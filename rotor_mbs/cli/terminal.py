@@ -20,7 +20,6 @@ from rotor_mbs.solution.status import REFUSED
 if TYPE_CHECKING:  # not loaded here: a sweep's workers start before these are imported
     from rotor_mbs.analysis.text_tables import TextTable
     from rotor_mbs.runs.runner import RunOutcome
-    from rotor_mbs.studies.run import BatchReport
 
 
 def print_table(table: TextTable | str) -> None:
@@ -44,12 +43,12 @@ def print_json(data: object, *, indent: int | None = None) -> None:
     print(json.dumps(data, ensure_ascii=not is_unicode, indent=indent))
 
 
-def print_summary(report: BatchReport, output: Path, refused: Sequence[Refusal] = ()) -> int:
+def print_summary(runs: Sequence[RunOutcome], output: Path, refused: Sequence[Refusal] = ()) -> int:
     """Print a summary of the runs of a call, and return the exit status.
 
     Parameters
     ----------
-    report : what the call computed, and what was stored already.
+    runs : what the call computed, or tried to, and what was stored already.
     output : the results file.
     refused : runs that were left out before the call began.
 
@@ -59,23 +58,26 @@ def print_summary(report: BatchReport, output: Path, refused: Sequence[Refusal] 
         The exit status: 1 if a run that should succeed did not, or was not computed; 2 if the
         methods refused all runs.
     """
-    is_incomplete = print_not_computed(report.computed, refused)
-    computed = [run for run in report.computed if run.status != REFUSED]
+    is_incomplete = print_not_computed(runs, refused)
+    accepted = [run for run in runs if run.status != REFUSED]
+    computed = [run for run in accepted if run.is_computed]
+    stored = [run for run in accepted if not run.is_computed]
     counts = Counter(run.status if run.is_stored else "not computed" for run in computed)
     text = "nothing to do"
     if computed:
         parts = [f"{count} {status}" for status, count in counts.most_common()]
         text = f"{counted(len(computed), 'run')} computed ({', '.join(parts)})"
-    text += f", {len(report.stored)} already stored"
-    not_run = len(refused) + len(report.computed) - len(computed)
+    text += f", {len(stored)} already stored"
+    not_run = len(refused) + len(runs) - len(accepted)
     if not_run:
         text += f", {not_run} not run"
     print(f"{output}: {text}")
-    for line in report.stored_failures:
-        print(f"stored: {line}", file=sys.stderr)
-    if not_run and all(run.method == REFERENCE for run in [*computed, *report.stored]):
+    for run in stored:
+        if run.has_failed:
+            print(f"stored: {run.label} {run.status}: {run.message}", file=sys.stderr)
+    if not_run and all(run.method == REFERENCE for run in accepted):
         return EXIT_BAD_INPUT
-    if is_incomplete or report.failures or report.stored_failures:
+    if is_incomplete or any(run.has_failed for run in runs):
         return EXIT_FAILED
     return EXIT_OK
 

@@ -15,7 +15,7 @@ from typing import Self, TypeVar
 import numpy as np
 
 from rotor_mbs.errors import InputError, MethodRefusal, StoreError
-from rotor_mbs.methods.catalogue import with_method_files
+from rotor_mbs.methods.catalogue import is_corrected, with_method_files
 from rotor_mbs.processes.pool import TaskEnd, TaskPool, run_in
 from rotor_mbs.runs.rows import RowLocation, Rows
 from rotor_mbs.solution.status import REFUSED
@@ -38,6 +38,7 @@ class RunOutcome:
     message : the reason of the status, if there is one.
     seconds : run time in s; NaN if nothing was timed.
     is_stored : whether there is a row; if not, the same call tries again.
+    is_computed : whether this call computed it, or tried to; if not, it was stored before.
     is_shipped : whether it was read from a shipped file and not computed.
     share : part of the work of the call that was done when it ended, from 0 to 1.
     """
@@ -48,8 +49,17 @@ class RunOutcome:
     message: str = ""
     seconds: float = float("nan")
     is_stored: bool = True
+    is_computed: bool = True
     is_shipped: bool = False
     share: float = 0.0
+
+    @property
+    def has_failed(self) -> bool:
+        """Return whether the stored run should have succeeded and did not.
+
+        The printed equations cannot fail: how far their runs get is a result.
+        """
+        return self.is_stored and self.status != "ok" and is_corrected(self.method)
 
 
 OnProgress = Callable[[int, int, RunOutcome], None]

@@ -611,12 +611,10 @@ def run_bench(
     chosen = catalogue.ladders(methods).values()
     with locked(output):
         none: Mapping[str, Sequence[str]] = {scene.name: () for scene in scenes}
-        report = run_scenes(scenes, none, output, workers=workers, timeout_s=_REFERENCE_LIMIT_S)
-        failed = {
-            run.label.partition(" ")[0]: run for run in (*report.failures, *report.not_computed)
-        }
+        references = run_scenes(scenes, none, output, workers=workers, timeout_s=_REFERENCE_LIMIT_S)
         # scenes whose reference was computed again: their curves are measured again
-        changed = {run.label.partition(" ")[0] for run in report.computed}
+        changed = {run.label.partition(" ")[0]: run for run in references if run.is_computed}
+        failed = {name: run for name, run in changed.items() if run.has_failed or not run.is_stored}
         curves: list[Curve] = []
         refused: list[Refusal] = []
         options = {"repeats": repeats, "budget_s": budget_s}

@@ -119,7 +119,7 @@ def check_default_set(
             asked[scene.name] = corrected if scene in own else default_methods()
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "check.h5"
-        report = run_scenes(
+        runs = run_scenes(
             [*paper, *own],
             asked,
             path,
@@ -129,7 +129,8 @@ def check_default_set(
         )
         checks = [
             _required(run.label.partition(" ")[0], run.method, run.message)
-            for run in report.not_computed
+            for run in runs
+            if not run.is_stored
         ]
         return checks + judge_file(path, bounds)
 

@@ -25,12 +25,17 @@ from rotor_mbs.runs.design import results_tables
 from rotor_mbs.runs.merge import fit_file_to_request
 from rotor_mbs.runs.output_files import locked
 from rotor_mbs.runs.read import open_results
-from rotor_mbs.runs.runner import OnProgress, ignore_progress, run_tasks_references_first
+from rotor_mbs.runs.runner import (
+    OnProgress,
+    RunOutcome,
+    ignore_progress,
+    run_tasks_references_first,
+)
 from rotor_mbs.runs.versions import versions
 from rotor_mbs.scenario.catalogue import REFERENCES, SCENARIOS, find_scenes
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.studies.bench import Curve, curve_of, curve_tables, curve_tasks
-from rotor_mbs.studies.run import BatchReport, missing_runs, requested_runs
+from rotor_mbs.studies.run import missing_runs, requested_runs
 
 # The scene whose error and run time are measured by all methods: the paper's own crest, and a
 # horizon of 6 s.
@@ -41,7 +46,7 @@ _LONGEST_S = 0.25
 
 def reproduce(
     output: Path, *, workers: Workers, timeout_s: float, on_progress: OnProgress = ignore_progress
-) -> tuple[BatchReport, list[Refusal]]:
+) -> tuple[list[RunOutcome], list[Refusal]]:
     """Compute the default set of runs and the curves into a results file; what it has is kept.
 
     Parameters
@@ -53,8 +58,8 @@ def reproduce(
 
     Returns
     -------
-    BatchReport
-        The runs of this call, and those that were stored.
+    list of RunOutcome
+        The runs of this call, then those that were stored.
     list of Refusal
         Runs that were left out.
 
@@ -84,9 +89,7 @@ def reproduce(
         unmeasured = [curve for curve in curves if is_new or not curve.is_stored(file)]
         of_curves = curve_tasks(file, unmeasured, 1.2 * timeout_s + 10.0, _LONGEST_S)
         made = run_tasks_references_first([*runs, *of_curves], pool, on_progress)
-        return BatchReport(
-            [outcome for outcome in made if outcome.label in labels], stored
-        ), refused
+        return [outcome for outcome in made if outcome.label in labels] + stored, refused
 
 
 def made_from(results: Path, timeout_s: float) -> str:

@@ -138,44 +138,6 @@ def work_of(scene: Scene, method: str) -> float:
     return _FIXED_WORK + find_method(method).relative_cost * scene.duration / 10.0
 
 
-@dataclass(frozen=True)
-class BatchReport:
-    """Hold the outcomes of the runs of a call: those that it computed, and those stored before."""
-
-    computed: list[RunOutcome]
-    stored: list[RunOutcome]
-
-    @property
-    def failures(self) -> list[RunOutcome]:
-        """Return the runs that should have succeeded and did not.
-
-        The printed equations cannot fail: how far their runs get is a result.
-        """
-        return [
-            run
-            for run in self.computed
-            if run.is_stored and run.status != "ok" and is_corrected(run.method)
-        ]
-
-    @property
-    def stored_failures(self) -> list[str]:
-        """Return a line for each run that was stored already, should have succeeded and did not."""
-        return [
-            f"{run.label} {run.status}: {run.message}"
-            for run in self.stored
-            if run.status != "ok" and is_corrected(run.method)
-        ]
-
-    @property
-    def not_computed(self) -> list[RunOutcome]:
-        """Return the runs of which nothing is stored; the same call tries them again.
-
-        Their method refused the scene, their process died or could not start, or their reference
-        was not computed.
-        """
-        return [run for run in self.computed if not run.is_stored]
-
-
 @caller_signals()
 def run_scenes(
     scenes: Sequence[Scene],
@@ -187,7 +149,7 @@ def run_scenes(
     settings: Mapping[str, object] | None = None,
     use_frozen: bool = True,
     on_progress: OnProgress = ignore_progress,
-) -> BatchReport:
+) -> list[RunOutcome]:
     """Compute references and runs, and store them in a results file.
 
     Rows that the file has already are kept. A requested row is computed again if its settings, its
@@ -204,6 +166,11 @@ def run_scenes(
     use_frozen : whether a shipped reference may stand for a computed one.
     on_progress : called after each run.
 
+    Returns
+    -------
+    list of RunOutcome
+        The runs that this call computed, or tried to, then those that were stored before.
+
     Raises
     ------
     InputError, StoreError, KeyboardInterrupt
@@ -213,7 +180,7 @@ def run_scenes(
     with locked(output), pool_of(workers) as pool:
         file = fit_file_to_request(output, results_tables(requests))
         tasks, stored = missing_runs(file, requests, timeout_s)
-        return BatchReport(run_tasks_references_first(tasks, pool, on_progress), stored)
+        return run_tasks_references_first(tasks, pool, on_progress) + stored
 
 
 def requested_runs(
@@ -291,16 +258,17 @@ def missing_runs(
             references[run.label] = place
             if is_missing:
                 new_references.add(run.label)
+        label = f"{run.scene.name} {run.method}"
         if not is_missing:
             message = text_of(row["message"][0])
-            stored.append(RunOutcome(f"{run.scene.name} {run.method}", run.method, status, message))
+            stored.append(RunOutcome(label, run.method, status, message, is_computed=False))
             continue
         copied_status = row[STATUS_COPIES["status"]][0]
         if row["status"][0] != MISSING or copied_status != MISSING:
             place.mark_missing([0])
         tasks.append(
             RunTask(
-                label=f"{run.scene.name} {run.method}",
+                label=label,
                 method=run.method,
                 place=place,
                 reference=reference,

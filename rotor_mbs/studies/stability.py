@@ -222,7 +222,7 @@ def run_suite(
         # The patient method first: a run that ended at its longer limit is not computed again with
         # the shorter one.
         for chosen, limit_s in ((patient, max(timeout_s, _PATIENT_S)), (asked, timeout_s)):
-            report = run_scenes(
+            outcomes = run_scenes(
                 scenes,
                 chosen,
                 output,
@@ -231,7 +231,7 @@ def run_suite(
                 settings=settings,
                 on_progress=on_progress,
             )
-            made += report.computed
+            made += [outcome for outcome in outcomes if outcome.is_computed]
         return made + complete_ladders(scenes, asked, output, pool, on_progress), refused
 
 

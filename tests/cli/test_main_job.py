@@ -16,7 +16,6 @@ from rotor_mbs.runs.read import open_results
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.studies import reproduce
-from rotor_mbs.studies.run import BatchReport
 
 SCENES = [reproduce.BENCHED]
 PRINTED, RIGHT = "printed/ode45", ("lagrange/taylor", "exudyn_tree/rk67")
@@ -97,11 +96,11 @@ def again(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., bool]:
     work was done."""
     done: list[Path] = []
 
-    def compute(results: Path, **_: object) -> tuple[BatchReport, list[object]]:
+    def compute(results: Path, **_: object) -> tuple[list[object], list[object]]:
         done.append(results)
         if not results.exists():
             results.write_bytes(bytes(1000))
-        return BatchReport([], 0), []
+        return [], []
 
     def write(_results: Path, pages: Path, *_: object) -> None:
         pages.mkdir(parents=True, exist_ok=True)

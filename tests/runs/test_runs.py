@@ -28,7 +28,7 @@ from rotor_mbs.runs.runner import RunOutcome
 from rotor_mbs.runs.table import TableFile
 from rotor_mbs.runs.versions import code_digest, row_versions
 from rotor_mbs.scenario.catalogue import find_scenes
-from rotor_mbs.studies.run import BatchReport, RunTask, run_scenes
+from rotor_mbs.studies.run import RunTask, run_scenes
 
 SCENE = paper("fig08")
 METHODS = ("lagrange/dop853", "exudyn_tree/rk67", "lagrange/ode45")
@@ -40,14 +40,14 @@ def blank(task: RunTask) -> Rows:
     return task.failed("ok", task.request.method)
 
 
-def run(path: Path, methods: Sequence[str] = METHODS, **options: object) -> BatchReport:
+def run(path: Path, methods: Sequence[str] = METHODS, **options: object) -> list[RunOutcome]:
     given = {"workers": 0, "timeout_s": 60.0, "perform": blank, **options}
     with patch.object(RunTask, "perform", given.pop("perform")):
         return run_scenes([SCENE], {SCENE.name: methods}, path, **given)  # type: ignore[arg-type]
 
 
-def made(report: BatchReport) -> list[str]:
-    return [outcome.method for outcome in report.computed if outcome.is_stored]
+def made(outcomes: Sequence[RunOutcome]) -> list[str]:
+    return [run.method for run in outcomes if run.is_computed and run.is_stored]
 
 
 def stored(path: Path) -> list[str]:
@@ -122,11 +122,11 @@ def test_references_come_first_and_what_is_stored_is_skipped(tmp_path: Path) -> 
     first = run(path, METHODS[:2])
     assert made(first)[0] == "reference"
     assert sorted(made(first)) == sorted(["reference", *METHODS[:2]])
-    assert first.computed[-1].share == 1.0
+    assert first[-1].share == 1.0
     assert made(run(path)) == [METHODS[2]]
     before = path.read_bytes()
     again = run(path)
-    assert (again.computed, len(again.stored)) == ([], 4)
+    assert [outcome.is_computed for outcome in again] == [False] * 4
     assert path.read_bytes() == before
     assert [entry.name for entry in tmp_path.iterdir()] == ["r.h5"]
 
@@ -138,8 +138,9 @@ def without_memory(task: RunTask) -> Rows:
 
 
 def test_runs_whose_reference_was_not_computed_are_not_computed(tmp_path: Path) -> None:
-    report = run(tmp_path / "r.h5", perform=without_memory)
-    assert [outcome.status for outcome in report.not_computed] == [
+    outcomes = run(tmp_path / "r.h5", perform=without_memory)
+    assert not any(outcome.is_stored for outcome in outcomes)
+    assert [outcome.status for outcome in outcomes] == [
         "worker_died",
         *["no_reference"] * 3,
     ]
@@ -204,7 +205,10 @@ def test_a_run_that_a_shorter_limit_ended_is_computed_again(tmp_path: Path) -> N
         assert run_row(results.scenes[SCENE.name].runs[METHODS[0]])[-1] == ""
     again = run(tmp_path / "r.h5", perform=slow, timeout_s=5.0)
     assert made(again) == []
-    assert again.stored_failures == [f"{SCENE.name} {METHODS[0]} timed_out: too slow"]
+    failed = [run for run in again if run.has_failed]
+    assert [(run.label, run.status, run.message) for run in failed] == [
+        (f"{SCENE.name} {METHODS[0]}", "timed_out", "too slow")
+    ]
     assert made(run(tmp_path / "r.h5", timeout_s=4.0)) == []
     assert made(run(tmp_path / "r.h5", timeout_s=6.0)) == [METHODS[0]]
 
