@@ -18,6 +18,9 @@ from rotor_mbs.runs.table import IDENTITY, TableFile
 from rotor_mbs.runs.trailer import RESULTS, may_extend, read_trailer
 from rotor_mbs.runs.versions import machine, versions
 
+KnownRows = Mapping[str, Mapping[str, Any]]  # by label: known values by name of the column
+KnownColumns = Mapping[str, tuple[Column, Any]]  # see `TableSpec.known`
+
 
 def fit_file_to_request(
     path: Path, wanted: Sequence[TableSpec], replaced: Collection[tuple[str, str, str]] = ()
@@ -54,16 +57,38 @@ def fit_file_to_request(
     if not may_extend(path, RESULTS):
         return _write_tables(path, wanted, [])
     file = TableFile(path)
-    stored = file.tables
-    wanted_tables = {table.group: table for table in wanted}
-    wanted_runs = _known_rows(wanted_tables.get(RUNS))
-    hashes = {row["scene"]: row["scene_hash"] for row in wanted_runs.values()}
-    # A file has only one scene of each name. If its numbers have changed, its stored runs cannot
-    # stay.
+    stored, requested = file.tables, {table.group: table for table in wanted}
+    _refuse_loss(path, _known_rows(stored.get(RUNS)), _known_rows(requested.get(RUNS)))
+    merged = _merged_tables(stored, requested, replaced)
+    kept = _kept_rows(stored, requested, merged)
+    # The file is kept if it has these rows and columns, and none of its rows is dropped.
+    count = sum(len(table.runs) for table in stored.values() if "crc32" in table.computed)
+    if len(kept) == count and _have_same_layout(merged, stored):
+        return file
+    rows = []
+    for group, run in kept:
+        place = file.place(run, group)
+        if place.is_stored:
+            rows.append((group, run, place.read()))
+    return _write_tables(path, list(merged.values()), rows)
+
+
+def _refuse_loss(path: Path, stored: KnownRows, requested: KnownRows) -> None:
+    """Raise InputError if runs would be lost because the numbers of their scene have changed.
+
+    A file has only one scene of each name. If its numbers have changed, its stored runs cannot
+    stay.
+
+    Parameters
+    ----------
+    path : the file.
+    stored, requested : known values of the runs, by label.
+    """
+    hashes = {row["scene"]: row["scene_hash"] for row in requested.values()}
     lost = []
-    for run, row in _known_rows(stored.get(RUNS)).items():
+    for run, row in stored.items():
         has_changed = hashes.get(row["scene"], row["scene_hash"]) != row["scene_hash"]
-        if has_changed and run not in wanted_runs:
+        if has_changed and run not in requested:
             lost.append(
                 f"{path}: {row['scene']}: has a run of {row['method_name']} with other numbers of "
                 "this scene, which this call would remove and not compute again; allowed: another "
@@ -71,61 +96,96 @@ def fit_file_to_request(
             )
     if lost:
         raise InputError(lost)
-    # Tables with a row per run or point: their stored rows, then the requested ones.
+
+
+def _merged_tables(
+    stored: Mapping[str, TableSpec],
+    requested: Mapping[str, TableSpec],
+    replaced: Collection[tuple[str, str, str]],
+) -> dict[str, TableSpec]:
+    """Return the tables of the new file by group: with stored rows that stay, and requested ones.
+
+    Parameters
+    ----------
+    stored, requested : tables by group.
+    replaced : stored rows that are dropped, see `fit_file_to_request`.
+    """
     merged: dict[str, TableSpec] = {}
-    kept: list[tuple[str, str]] = []  # group and label of the stored rows that are copied
-    for group in dict.fromkeys((*stored, *wanted_tables)):
-        before, requested = stored.get(group), wanted_tables.get(group)
-        base = requested or stored[group]
-        # A table of a scene's arrays has no checksums; it follows below from the rows of /runs.
+    # Tables with a row per run or point; those of the scenes' arrays have no checksums.
+    for group in dict.fromkeys((*stored, *requested)):
+        before, wanted = stored.get(group), requested.get(group)
+        base = wanted or stored[group]
         if "crc32" not in base.computed:
             continue
-        requested_rows = _known_rows(requested)
+        wanted_rows = _known_rows(wanted)
         rows: dict[str, Mapping[str, Any]] = {}
         for run, row in _known_rows(before).items():
             curve = group, row["scene"], row.get("curve", row["method_name"])
-            if run not in requested_rows and curve in replaced:
-                continue
-            rows[run] = row
-            if run not in requested_rows or _is_same_row(row, requested_rows[run]):
-                kept.append((group, run))
-        rows |= requested_rows
+            if run in wanted_rows or curve not in replaced:
+                rows[run] = row
+        rows |= wanted_rows
         if rows:
             runs = sorted(rows, key=row_order) if group == RUNS else list(rows)
             known = {}
             for name, (column, _) in base.known.items():
                 known[name] = column, [rows[run][name] for run in runs]
-            columns = _joined_columns(before, requested)
-            merged[group] = TableSpec(group, runs, known, columns, base.attributes, base.characters)
+            merged[group] = _with_columns_of(before, base, runs, known)
     # Tables of the scenes' arrays: a row for each run that /runs has now.
     methods: dict[str, list[str]] = {}  # by scene
-    if RUNS in merged:
-        for run, scene in zip(merged[RUNS].runs, merged[RUNS].known["scene"][1], strict=True):
-            methods.setdefault(scene, []).append(str(run).removeprefix(f"{scene}/"))
-    for scene, methods_of_scene in methods.items():
-        before, requested = stored.get(scene), wanted_tables.get(scene)
+    for row in _known_rows(merged.get(RUNS)).values():
+        methods.setdefault(row["scene"], []).append(row["method_name"])
+    for scene, names in methods.items():
+        before, wanted = stored.get(scene), requested.get(scene)
+        base = wanted or stored[scene]
         # Arrays of a scene with other numbers are not taken over.
-        if (
-            before is not None
-            and requested is not None
-            and before.attributes["scene_hash"] != requested.attributes["scene_hash"]
-        ):
+        if before is not None and before.attributes["scene_hash"] != base.attributes["scene_hash"]:
             before = None
-        base = requested or stored[scene]
-        columns = _joined_columns(before, requested)
-        merged[scene] = TableSpec(
-            scene, methods_of_scene, base.known, columns, base.attributes, base.characters
-        )
-    # The file is kept if it has these rows and columns, and none of its rows is dropped.
-    count = sum(len(table.runs) for table in stored.values() if "crc32" in table.computed)
-    if len(kept) == count and _have_same_layout(merged, stored):
-        return file
-    rows_kept = []
-    for group, run in kept:
-        place = file.place(run, group)
-        if place.is_stored:
-            rows_kept.append((group, run, place.read()))
-    return _write_tables(path, list(merged.values()), rows_kept)
+        merged[scene] = _with_columns_of(before, base, names, base.known)
+    return merged
+
+
+def _with_columns_of(
+    before: TableSpec | None,
+    base: TableSpec,
+    runs: Sequence[str],
+    known: Mapping[str, tuple[Column, Any]],
+) -> TableSpec:
+    """Return a table like `base`, with other rows, that also has the computed columns of `before`.
+
+    Parameters
+    ----------
+    before, base : the stored table if there is one, and the requested one, or else the stored one.
+    runs, known : of the new table.
+    """
+    columns = {**(before.computed if before else {}), **base.computed}
+    checksum = columns.pop("crc32", None)  # the last of the columns
+    if checksum is not None:
+        columns["crc32"] = checksum
+    return TableSpec(base.group, runs, known, columns, base.attributes, base.characters)
+
+
+def _kept_rows(
+    stored: Mapping[str, TableSpec],
+    requested: Mapping[str, TableSpec],
+    merged: Mapping[str, TableSpec],
+) -> list[tuple[str, str]]:
+    """Return group and label of the stored rows that are copied into the new file.
+
+    A row of a run or a point stays if it is not requested, or is as it is requested.
+
+    Parameters
+    ----------
+    stored, requested, merged : tables by group.
+    """
+    kept = []
+    for group, table in stored.items():
+        if "crc32" not in table.computed:
+            continue
+        staying, wanted = _known_rows(merged.get(group)), _known_rows(requested.get(group))
+        for run, row in table.known_rows.items():
+            if run in staying and (run not in wanted or _is_same_row(row, wanted[run])):
+                kept.append((group, run))
+    return kept
 
 
 def copy_file(source: Path, target: Path) -> None:
@@ -162,7 +222,7 @@ def copy_file(source: Path, target: Path) -> None:
         write_file(target, source.read_bytes())
 
 
-def _known_rows(table: TableSpec | None) -> Mapping[str, Mapping[str, Any]]:
+def _known_rows(table: TableSpec | None) -> KnownRows:
     """Return the known values of each row of a table, by label; none without a table."""
     return {} if table is None else table.known_rows
 
@@ -191,16 +251,6 @@ def _have_same_layout(tables: Mapping[str, TableSpec], others: Mapping[str, Tabl
         if table.computed.keys() != other.computed.keys():
             return False
     return True
-
-
-def _joined_columns(before: TableSpec | None, requested: TableSpec | None) -> dict[str, Column]:
-    """Return the computed columns of two tables, the checksum last."""
-    columns: dict[str, Column] = {}
-    for table in (before, requested):
-        if table is not None:
-            columns |= table.computed
-    checksum = columns.pop("crc32", None)
-    return columns if checksum is None else {**columns, "crc32": checksum}
 
 
 def _write_tables(
