@@ -21,7 +21,7 @@ from support.stored import Made, rotor, store
 import rotor_mbs as rm
 from rotor_mbs.models.lagrange.heyoka_adapter import is_available
 from rotor_mbs.runs import progress, table, untrusted
-from rotor_mbs.runs.hdf5 import StoredGroup
+from rotor_mbs.runs.hdf5 import TableSpec
 from rotor_mbs.runs.runner import RunOutcome
 from rotor_mbs.runs.trailer import Trailer
 from rotor_mbs.studies import check
@@ -201,7 +201,7 @@ def test_a_file_is_opened_once_and_a_run_reads_its_scene_alone(
 
     def counted(
         path: Path, kinds: Collection[str], only: Collection[str] | None = None
-    ) -> tuple[dict[str, StoredGroup], Trailer]:
+    ) -> tuple[dict[str, TableSpec], Trailer]:
         groups, trailer = read(path, kinds, only)
         opened.append([name for name in groups if name])
         return groups, trailer

@@ -6,17 +6,15 @@ columns are called known; the others are computed, and filled in row by row.
 
 from __future__ import annotations
 
-import functools
 import json
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotor_mbs.methods.catalogue import REFERENCE, find_method, method_names
-from rotor_mbs.runs.hdf5 import CHARACTERS, Column
+from rotor_mbs.runs.hdf5 import CHARACTERS, Column, TableSpec
 from rotor_mbs.runs.versions import row_versions
 from rotor_mbs.scenario.catalogue import natural_key
 from rotor_mbs.scenario.scene import Scene, scene_hash
@@ -285,64 +283,6 @@ def arrays_of(run: RunRequest) -> dict[str, Column]:
         dimensions = quantity.dimensions if is_once else ("run", *quantity.dimensions)
         columns[quantity.name] = Column(dimensions, quantity.units, quantity.long_name)
     return columns
-
-
-@dataclass(frozen=True)
-class TableSpec:
-    """A table as it is to be laid out.
-
-    Attributes
-    ----------
-    group : its path in the file; "" for the root.
-    runs : (rows,) unique labels or numbers of the rows: the scale of the dimension `run`.
-    known : column and values by name: the known columns of the rows, and the scales of the
-        dimensions other than `run`.
-    computed : columns that are filled in later, in the order in which the checksum of a row covers
-        them. A column without the dimension `run` belongs to the reference.
-    attributes : of the group.
-    characters : length of each computed text.
-    """
-
-    group: str
-    runs: Sequence[str] | NDArray[Any]
-    known: Mapping[str, tuple[Column, Any]]
-    computed: Mapping[str, Column]
-    attributes: Mapping[str, Any] = field(default_factory=dict)
-    characters: int = 0
-
-    @functools.cached_property
-    def row_type(self) -> np.dtype[np.void]:
-        """Return the type of one row: its computed columns in the order of its checksum."""
-        lengths = {name: len(values) for name, (_, values) in self.known.items()}
-        lengths[CHARACTERS] = self.characters
-        fields: list[tuple[str, str, tuple[int, ...]]] = []
-        for name, column in self.computed.items():
-            dimensions = [dimension for dimension in column.dimensions if dimension != "run"]
-            shape = tuple(lengths[dimension] for dimension in dimensions)
-            fields.append((name, column.kind, shape))
-        return np.dtype(fields)
-
-    def shape(self, name: str) -> tuple[int, ...]:
-        """Return the shape of a computed column."""
-        rows = (len(self.runs),) if "run" in self.computed[name].dimensions else ()
-        return (*rows, *self.row_type[name].shape)
-
-    @functools.cached_property
-    def known_rows(self) -> Mapping[str, Mapping[str, Any]]:
-        """Return, for the label of each row, its known values by column.
-
-        It is for tables whose known columns all have the dimension `run`.
-        """
-        columns = {name: list(values) for name, (_, values) in self.known.items()}
-        rows = {}
-        for i, run in enumerate(self.runs):
-            rows[str(run)] = {name: values[i] for name, values in columns.items()}
-        return rows
-
-    @functools.cached_property
-    def row_of(self) -> Mapping[str, int]:
-        """Return the number of each row, by its label."""
-        return {str(run): row for row, run in enumerate(self.runs)}
 
 
 def known_columns(rows: Sequence[Mapping[str, object]]) -> dict[str, tuple[Column, Any]]:

@@ -6,8 +6,10 @@ little, so that the worker starts fast.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+import functools
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -58,26 +60,68 @@ class Column(NamedTuple):
     attributes: Mapping[str, Any] = {}
 
 
-class StoredGroup(NamedTuple):
-    """A group of a file without its rows.
+@dataclass(frozen=True)
+class TableSpec:
+    """A table without its rows, as it is to be laid out, or a group of a file as it is read.
 
     Attributes
     ----------
+    group : its path in the file; "" for the root.
+    runs : (rows,) unique labels or numbers of the rows: the scale of the dimension `run`. A group
+        that is no table has none, and all its columns are known.
+    known : column and values by name: the known columns of the rows, and the scales of the
+        dimensions other than `run`.
+    computed : columns that are filled in later, in the order in which the checksum of a row covers
+        them. A column without the dimension `run` belongs to the reference.
     attributes : of the group.
-    columns : descriptions of its datasets, by name.
-    values : of the known columns and scales, which are datasets that the trailer does not have.
     characters : length of each computed text.
     """
 
-    attributes: dict[str, Any]
-    columns: Mapping[str, Column]
-    values: Mapping[str, NDArray[Any]]
-    characters: int
+    group: str
+    runs: Sequence[str] | NDArray[Any]
+    known: Mapping[str, tuple[Column, Any]]
+    computed: Mapping[str, Column]
+    attributes: Mapping[str, Any] = field(default_factory=dict)
+    characters: int = 0
+
+    @functools.cached_property
+    def row_type(self) -> np.dtype[np.void]:
+        """Return the type of one row: its computed columns in the order of its checksum."""
+        lengths = {name: len(values) for name, (_, values) in self.known.items()}
+        lengths[CHARACTERS] = self.characters
+        fields: list[tuple[str, str, tuple[int, ...]]] = []
+        for name, column in self.computed.items():
+            dimensions = [dimension for dimension in column.dimensions if dimension != "run"]
+            shape = tuple(lengths[dimension] for dimension in dimensions)
+            fields.append((name, column.kind, shape))
+        return np.dtype(fields)
+
+    def shape(self, name: str) -> tuple[int, ...]:
+        """Return the shape of a computed column."""
+        rows = (len(self.runs),) if "run" in self.computed[name].dimensions else ()
+        return (*rows, *self.row_type[name].shape)
+
+    @functools.cached_property
+    def known_rows(self) -> Mapping[str, Mapping[str, Any]]:
+        """Return, for the label of each row, its known values by column.
+
+        It is for tables whose known columns all have the dimension `run`.
+        """
+        columns = {name: list(values) for name, (_, values) in self.known.items()}
+        rows = {}
+        for i, run in enumerate(self.runs):
+            rows[str(run)] = {name: values[i] for name, values in columns.items()}
+        return rows
+
+    @functools.cached_property
+    def row_of(self) -> Mapping[str, int]:
+        """Return the number of each row, by its label."""
+        return {str(run): row for row, run in enumerate(self.runs)}
 
 
 def read_groups(
     path: Path, kinds: Collection[str], only: Collection[str] | None = None
-) -> tuple[dict[str, StoredGroup], Trailer]:
+) -> tuple[dict[str, TableSpec], Trailer]:
     """Read a file of this program, in the worker process unless the file is trusted.
 
     Parameters
@@ -88,7 +132,7 @@ def read_groups(
 
     Returns
     -------
-    dict of StoredGroup
+    dict of TableSpec
         By name; "" is the root.
     Trailer
         Of the file, with all its groups and the locations of the computed columns.
@@ -125,32 +169,41 @@ def _read_arrays(path: Path, asked: tuple[str, Collection[str]]) -> dict[str, ND
 
 def _read_groups(
     path: Path, selection: tuple[Collection[str], Collection[str] | None]
-) -> tuple[dict[str, StoredGroup], Trailer]:
+) -> tuple[dict[str, TableSpec], Trailer]:
     """Read a file in this process; `selection` is (kinds, only), see `read_groups`."""
     kinds, only = selection
     with open_file(path) as (file, trailer), reading(path):
-        groups = {"": _read_group(file, trailer.groups.get("", {}))}
+        groups = {"": _read_group(file, "", trailer.groups.get("", {}))}
         for name in trailer.groups if trailer.kind in kinds else ():
             if name and (only is None or name in only):
-                groups[name] = _read_group(group_at(file, name), trailer.groups[name])
+                groups[name] = _read_group(group_at(file, name), name, trailer.groups[name])
         return groups, trailer
 
 
-def _read_group(group: Any, regions: Mapping[str, tuple[int, int]]) -> StoredGroup:
-    """Read a group, but not the columns in `regions`, which must be where these say."""
+def _read_group(group: Any, path: str, regions: Mapping[str, tuple[int, int]]) -> TableSpec:
+    """Read a group, but not the columns in `regions`, which must be where these say.
+
+    Parameters
+    ----------
+    group, path : an h5py.Group, and its path in the file.
+    regions : offset and length of each computed column, as the trailer has them.
+    """
     datasets = datasets_of(group)
     columns = columns_of(datasets)
-    values = {name: values_of(dataset) for name, dataset in datasets.items() if name not in regions}
+    known = {}
+    for name, dataset in datasets.items():
+        if name not in regions:
+            known[name] = columns[name], values_of(dataset)
+    _, runs = known.pop("run", (None, ()))
+    computed = {name: columns[name] for name in regions}
     characters = len(group[CHARACTERS]) if CHARACTERS in group else 0
-    lengths = {name: len(scale) for name, scale in values.items() if scale.ndim}
-    lengths[CHARACTERS] = characters
+    table = TableSpec(path, runs, known, computed, attributes_of(group), characters)
     for name, region in regions.items():
         dataset = datasets[name]
-        shape = tuple(lengths[dimension] for dimension in columns[name].dimensions)
-        if dataset.shape != shape or place_of(dataset) != tuple(region):
-            place = f"{group.file.filename}: {group.name.strip('/')}/{name}"
+        if dataset.shape != table.shape(name) or place_of(dataset) != tuple(region):
+            place = f"{group.file.filename}: {path}/{name}"
             raise StoreError(f"{place} has shape {dataset.shape} of {dataset.dtype}; damaged")
-    return StoredGroup(attributes_of(group), columns, values, characters)
+    return table
 
 
 @contextmanager

@@ -8,6 +8,7 @@ import os
 import threading
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor_mbs.runs.design import MISSING, TableSpec
+from rotor_mbs.runs.design import MISSING
 from rotor_mbs.runs.hdf5 import (
     CHARACTERS,
     TEXT,
@@ -23,6 +24,7 @@ from rotor_mbs.runs.hdf5 import (
     TEXT_TYPE,
     WITHOUT_VALUES,
     Column,
+    TableSpec,
     is_group,
     place_of,
 )
@@ -86,23 +88,11 @@ def create_file(
         inode = temporary.stat().st_ino
         laid_tables = []
         for table in tables:
-            offsets = {name: offset for name, (offset, _) in regions[table.group].items()}
             known = {}
             for name, (column, values) in table.known.items():
                 known[name] = column, _as_stored(values)
-            laid_tables.append(
-                StoredTable(
-                    group=table.group,
-                    runs=_as_stored(table.runs),
-                    known=known,
-                    computed=table.computed,
-                    attributes=table.attributes,
-                    characters=table.characters,
-                    path=temporary,
-                    inode=inode,
-                    offsets=offsets,
-                )
-            )
+            laid = replace(table, runs=_as_stored(table.runs), known=known)
+            laid_tables.append(StoredTable.of(laid, temporary, inode, regions))
         yield TableFile(temporary, laid_out_as=(attributes, laid_tables))
 
 

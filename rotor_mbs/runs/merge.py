@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from rotor_mbs.errors import InputError
-from rotor_mbs.runs.design import MISSING, RUNS, TableSpec, row_order
-from rotor_mbs.runs.hdf5 import Column
+from rotor_mbs.runs.design import MISSING, RUNS, row_order
+from rotor_mbs.runs.hdf5 import Column, TableSpec
 from rotor_mbs.runs.layout import KEYWORDS, create_file
 from rotor_mbs.runs.output_files import locked, write_file
 from rotor_mbs.runs.rows import Rows, blank_rows

@@ -38,10 +38,9 @@ from rotor_mbs.runs.design import (
     REFERENCE_ARRAYS,
     RUNS,
     STATUS_COPIES,
-    TableSpec,
     known_columns,
 )
-from rotor_mbs.runs.hdf5 import ATTEMPTS, Column, StoredGroup, read_groups, reading
+from rotor_mbs.runs.hdf5 import ATTEMPTS, Column, TableSpec, read_groups, reading
 from rotor_mbs.runs.layout import new_file, new_group, put, put_attributes
 from rotor_mbs.runs.output_files import locked
 from rotor_mbs.runs.rows import RowLocation, Rows, checksums, text_of
@@ -722,7 +721,7 @@ def read_records(path: Path, kind: str) -> list[Record]:
             return [record for table in tables for record in _point_records(table)]
     groups, _ = read_groups(path, [kind])
     with reading(path):
-        return [_record(name, group) for name, group in groups.items() if name]
+        return [_record(group) for name, group in groups.items() if name]
 
 
 def _point_records(stored: StoredTable) -> Iterator[Record]:
@@ -811,12 +810,17 @@ def write_records(path: Path, records: Sequence[Record]) -> None:
                         put_attributes(dataset, {"labels": record.attributes[f"{name}_labels"]})
 
 
-def _record(path: str, group: StoredGroup) -> Record:
-    """Return the record of the group at `path`."""
-    kind, *scene, owner, name = path.split("/")
-    scales_first = dict(
-        sorted(group.columns.items(), key=lambda column: column[1].dimensions != (column[0],))
+def _record(group: TableSpec) -> Record:
+    """Return the record of a group of arrays."""
+    kind, *scene, owner, name = group.group.split("/")
+    scales_first = sorted(
+        group.known.items(), key=lambda known: known[1][0].dimensions != (known[0],)
     )
     return Record(
-        kind, "/".join(scene), f"{owner}/{name}", group.attributes, group.values, scales_first
+        kind,
+        "/".join(scene),
+        f"{owner}/{name}",
+        group.attributes,
+        {array: values for array, (_, values) in group.known.items()},
+        {array: column for array, (column, _) in scales_first},
     )

@@ -25,8 +25,8 @@ from numpy.typing import NDArray
 
 from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.methods.catalogue import find_method
-from rotor_mbs.runs.design import MISSING, TableSpec, columns_in, flags, scene_scales
-from rotor_mbs.runs.hdf5 import Column, reading
+from rotor_mbs.runs.design import MISSING, columns_in, flags, scene_scales
+from rotor_mbs.runs.hdf5 import Column, TableSpec, reading
 from rotor_mbs.runs.layout import create_file
 from rotor_mbs.runs.output_files import locked
 from rotor_mbs.runs.read import StoredRun

@@ -25,7 +25,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,11 +41,10 @@ from rotor_mbs.runs.design import (
     POINT_COLUMNS,
     RUNS,
     STATUS_COPIES,
-    TableSpec,
 )
-from rotor_mbs.runs.hdf5 import Column, StoredGroup, read_groups, reading
+from rotor_mbs.runs.hdf5 import Column, TableSpec, read_groups, reading
 from rotor_mbs.runs.rows import RowLocation, blank_rows
-from rotor_mbs.runs.trailer import RESULTS, SWEEP, Trailer
+from rotor_mbs.runs.trailer import RESULTS, SWEEP, Regions, Trailer
 
 # Attribute of a sweep's file: a hash of its whole design.
 IDENTITY = "sweep_identity"
@@ -67,6 +66,28 @@ class StoredTable(TableSpec):
     path: Path
     inode: int
     offsets: Mapping[str, int]
+
+    @classmethod
+    def of(cls, table: TableSpec, path: Path, inode: int, regions: Regions) -> Self:
+        """Return a table in a file.
+
+        Parameters
+        ----------
+        table : the table.
+        path, inode : the file.
+        regions : offset and length of each computed column, by group.
+        """
+        return cls(
+            group=table.group,
+            runs=table.runs,
+            known=table.known,
+            computed=table.computed,
+            attributes=table.attributes,
+            characters=table.characters,
+            path=path,
+            inode=inode,
+            offsets={name: offset for name, (offset, _) in regions[table.group].items()},
+        )
 
     @property
     def columns(self) -> dict[str, Column]:
@@ -247,12 +268,12 @@ class TableFile:
                 return
         kinds = RESULTS, SWEEP
         groups, trailer = read_groups(self.path, kinds, only)
-        self.attributes = groups[""].attributes
+        self.attributes = dict(groups[""].attributes)
         self.groups = list(trailer.groups) if trailer.kind in kinds else []
         with reading(self.path):
             for name in self.groups:
                 if only is None or name in only:
-                    self.tables[name] = _table(self.path, name, groups[name], trailer)
+                    self.tables[name] = _table(self.path, groups[name], trailer)
             self._check_runs()
 
     def copy(self) -> TableFile:
@@ -349,13 +370,12 @@ def opened_tables(path: Path, only: Collection[str] | None = None) -> TableFile:
     return file.copy()
 
 
-def _table(path: Path, group: str, stored: StoredGroup, trailer: Trailer) -> StoredTable:
+def _table(path: Path, stored: TableSpec, trailer: Trailer) -> StoredTable:
     """Return the table of a group.
 
     Parameters
     ----------
     path, trailer : the file.
-    group : name of the group.
     stored : what was read of it.
 
     Raises
@@ -363,20 +383,7 @@ def _table(path: Path, group: str, stored: StoredGroup, trailer: Trailer) -> Sto
     StoreError
         If it is no table, or differs from what was laid out.
     """
-    known = {name: (stored.columns[name], values) for name, values in stored.values.items()}
-    _, runs = known.pop("run")
-    regions = trailer.groups[group]
-    table = StoredTable(
-        group=group,
-        runs=runs,
-        known=known,
-        computed={name: stored.columns[name] for name in regions},
-        attributes=stored.attributes,
-        characters=stored.characters,
-        path=path,
-        inode=trailer.inode,
-        offsets={name: offset for name, (offset, _) in regions.items()},
-    )
+    table = StoredTable.of(stored, path, trailer.inode, trailer.groups)
     for name, column in table.computed.items():
         kind = np.dtype(column.kind)
         is_wrong = kind.kind not in "fiuS"
@@ -387,7 +394,7 @@ def _table(path: Path, group: str, stored: StoredGroup, trailer: Trailer) -> Sto
             )
         if is_wrong:
             shape = table.shape(name)
-            raise StoreError(f"{path}: {group}/{name} has shape {shape} of {kind}; damaged")
+            raise StoreError(f"{path}: {table.group}/{name} has shape {shape} of {kind}; damaged")
     _check_table(table)
     return table
 

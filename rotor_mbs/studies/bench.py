@@ -36,7 +36,8 @@ from rotor_mbs.methods.selection import Refusal, supporting_methods
 from rotor_mbs.methods.time_limit import OutOfTimeError, caller_signals, time_limit
 from rotor_mbs.processes import last_core
 from rotor_mbs.processes.pool import WorkerPool
-from rotor_mbs.runs.design import RunRequest, TableSpec
+from rotor_mbs.runs.design import RunRequest
+from rotor_mbs.runs.hdf5 import TableSpec
 from rotor_mbs.runs.merge import fit_file_to_request
 from rotor_mbs.runs.output_files import locked
 from rotor_mbs.runs.read import Record, points_table

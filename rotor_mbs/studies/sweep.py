@@ -30,7 +30,8 @@ from rotor_mbs.methods.solve import solve
 from rotor_mbs.methods.time_limit import OutOfTimeError, caller_signals, time_limit
 from rotor_mbs.models.lagrange.reference import error_growth
 from rotor_mbs.processes.pool import TaskPool
-from rotor_mbs.runs.design import COLUMNS, MISSING, TableSpec
+from rotor_mbs.runs.design import COLUMNS, MISSING
+from rotor_mbs.runs.hdf5 import TableSpec
 from rotor_mbs.runs.layout import KEYWORDS
 from rotor_mbs.runs.rows import RowLocation, Rows, blank_rows, row_of_run
 from rotor_mbs.runs.runner import Task, run_tasks

@@ -12,8 +12,8 @@ import pytest
 from support.scenes import paper
 
 from rotor_mbs.errors import InputError, StoreError
-from rotor_mbs.runs.design import CHARACTER, COLUMNS, MISSING, RunRequest, TableSpec, results_tables
-from rotor_mbs.runs.hdf5 import CHARACTERS, Column
+from rotor_mbs.runs.design import CHARACTER, COLUMNS, MISSING, RunRequest, results_tables
+from rotor_mbs.runs.hdf5 import CHARACTERS, Column, TableSpec
 from rotor_mbs.runs.layout import create_file
 from rotor_mbs.runs.merge import fit_file_to_request
 from rotor_mbs.runs.output_files import locked
