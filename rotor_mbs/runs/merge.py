@@ -19,7 +19,6 @@ from rotor_mbs.runs.trailer import RESULTS, may_extend, read_trailer
 from rotor_mbs.runs.versions import machine, versions
 
 KnownRows = Mapping[str, Mapping[str, Any]]  # by label: known values by name of the column
-KnownColumns = Mapping[str, tuple[Column, Any]]  # see `TableSpec.known`
 
 
 def fit_file_to_request(
@@ -63,7 +62,7 @@ def fit_file_to_request(
     kept = _kept_rows(stored, requested, merged)
     # The file is kept if it has these rows and columns, and none of its rows is dropped.
     count = sum(len(table.runs) for table in stored.values() if "crc32" in table.computed)
-    if len(kept) == count and _have_same_layout(merged, stored):
+    if len(kept) == count and _layout(merged) == _layout(stored):
         return file
     rows = []
     for group, run in kept:
@@ -240,17 +239,9 @@ def _is_same_row(stored: Mapping[str, Any], requested: Mapping[str, Any]) -> boo
     return True
 
 
-def _have_same_layout(tables: Mapping[str, TableSpec], others: Mapping[str, TableSpec]) -> bool:
-    """Return whether tables by group have the same rows and computed columns as others."""
-    if tables.keys() != others.keys():
-        return False
-    for group, table in tables.items():
-        other = others[group]
-        if list(table.runs) != list(other.runs):
-            return False
-        if table.computed.keys() != other.computed.keys():
-            return False
-    return True
+def _layout(tables: Mapping[str, TableSpec]) -> dict[str, object]:
+    """Return the rows and the computed columns of tables, by group."""
+    return {group: (list(table.runs), {*table.computed}) for group, table in tables.items()}
 
 
 def _write_tables(
