@@ -307,7 +307,7 @@ def bench(arguments: argparse.Namespace) -> int:
             workers=cores(),
             on_progress=progress,
         )
-    measured = len({outcome.label.partition(" ")[0] for outcome in made})
+    measured = len({outcome.scene for outcome in made})
     is_incomplete = print_not_computed(made, refused)
     not_run = {refusal.scene for refusal in refused if not refusal.method}
     names = {scene.name for scene in scenes} - not_run
@@ -387,7 +387,7 @@ def modes(arguments: argparse.Namespace) -> int:
     is_incomplete = print_not_computed(made)
     if all(outcome.status == REFUSED for outcome in made):
         return EXIT_BAD_INPUT
-    lost = {outcome.label.partition(" ")[0] for outcome in made if not outcome.is_stored}
+    lost = {outcome.scene for outcome in made if not outcome.is_stored}
     found = read_modes(arguments.output) if len(lost) < len(scenes) else {}
     # The file may have modes of an earlier call for a scene of which none were computed now.
     chosen = [

@@ -103,9 +103,7 @@ def print_not_computed(made: Sequence[RunOutcome], refused: Sequence[Refusal] = 
     refusals = list(refused)
     for outcome in not_stored:
         if outcome.status == REFUSED:
-            refusals.append(
-                Refusal(outcome.label.partition(" ")[0], outcome.method, outcome.message)
-            )
+            refusals.append(Refusal(outcome.scene, outcome.method, outcome.message))
     for refusal in refusals:
         print(refusal, file=sys.stderr)
     for outcome in lost:

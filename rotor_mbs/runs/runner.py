@@ -32,7 +32,7 @@ class RunOutcome:
 
     Attributes
     ----------
-    label, method : of the run.
+    label, method : of the run; the label begins with the name of the scene and a space.
     status : of a run; "measured" for other rows. If nothing is stored, the failure: REFUSED if the
         method refused the scene, "no_reference", or that of a `TaskEnd`.
     message : the reason of the status, if there is one.
@@ -52,6 +52,11 @@ class RunOutcome:
     is_computed: bool = True
     is_shipped: bool = False
     share: float = 0.0
+
+    @property
+    def scene(self) -> str:
+        """Return the name of its scene."""
+        return self.label.partition(" ")[0]
 
     @property
     def has_failed(self) -> bool:

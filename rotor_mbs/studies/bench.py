@@ -614,7 +614,7 @@ def run_bench(
         none: Mapping[str, Sequence[str]] = {scene.name: () for scene in scenes}
         references = run_scenes(scenes, none, output, workers=workers, timeout_s=_REFERENCE_LIMIT_S)
         # scenes whose reference was computed again: their curves are measured again
-        changed = {run.label.partition(" ")[0]: run for run in references if run.is_computed}
+        changed = {run.scene: run for run in references if run.is_computed}
         failed = {name: run for name, run in changed.items() if run.has_failed or not run.is_stored}
         curves: list[Curve] = []
         refused: list[Refusal] = []

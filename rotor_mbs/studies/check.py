@@ -128,9 +128,7 @@ def check_default_set(
             on_progress=on_progress,
         )
         checks = [
-            _required(run.label.partition(" ")[0], run.method, run.message)
-            for run in runs
-            if not run.is_stored
+            _required(run.scene, run.method, run.message) for run in runs if not run.is_stored
         ]
         return checks + judge_file(path, bounds)
 
