@@ -46,8 +46,10 @@ ROOT = Path(__file__).parents[2]
 # process that waits uses none.
 LIMIT_S = 20.0
 LIMIT_OF_WAITING_S = 3600.0
-# Tests that are named run whatever their mark, but for those that take minutes.
-PYTEST = ("-p", "no:cacheprovider", "-m", "not nightly and not browser")
+PYTEST = ("-p", "no:cacheprovider")
+# A test that is named runs whatever its mark, but for those that take minutes; of a file that is
+# named the default tests run.
+NAMED = ("-m", "not nightly and not browser")
 # Loaded once, for all forks.
 PACKAGES = (
     "exudyn",
@@ -765,8 +767,10 @@ def first_failure(
             path = results_file(Path(folder) / f"{number}.h5", [scene], [method], timeout_s=1e4)
             for check in failed(judged(path)):
                 return Answer(f"check {check.name}: {' '.join(check.where)}", (scene, method))
-        for paths in (_paths(likely_tests), _paths(tests)):
-            if paths and pytest.main(["-q", "-x", *PYTEST, *paths], [first]):
+        named = [test for test in tests if "::" in test]
+        files = [test for test in tests if "::" not in test]
+        for chosen, marks in ((likely_tests, NAMED), (named, NAMED), (files, ())):
+            if chosen and pytest.main(["-q", "-x", *PYTEST, *marks, *_paths(chosen)], [first]):
                 detector = first.name if "::" in first.name else None
                 return Answer(f"test {first.name or 'not found'}", detector)
     return Answer("", None, first.durations)
@@ -823,7 +827,7 @@ def load(tests: tuple[str, ...]) -> None:
     stored_references = importlib.import_module("rotor_mbs.studies.stored_references")
     stored_references.shipped_reference("")
     with redirect_stdout(io.StringIO()):
-        pytest.main(["--collect-only", *PYTEST, *_paths(tests)])
+        pytest.main(["--collect-only", *PYTEST, *NAMED, *_paths(tests)])
 
 
 def _paths(tests: Sequence[str]) -> list[str]:
