@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import operator
-import signal
-import threading
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ThreadPoolExecutor, wait
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from queue import LifoQueue
 from types import MappingProxyType
@@ -24,14 +22,11 @@ from rotor_mbs.errors import (
     system_errors_apart,
 )
 from rotor_mbs.processes import MAX_WORKERS, cores
-from rotor_mbs.processes.worker import TaskLostError, Worker
+from rotor_mbs.processes.worker import TaskLostError, Worker, delayed_interrupts
 
 T = TypeVar("T")
 R = TypeVar("R")
 
-_SIGNALS_OF_END = [
-    getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
-]
 _PER_WORKER = 2  # tasks submitted per worker: one to work on, one waiting
 # If so many tasks in a row fail for lack of memory, files or processes, the others are given up.
 _MAX_SYSTEM_FAILURES = 10
@@ -327,25 +322,3 @@ def _end_of(task: T, future: Future[R], pool: TaskPool) -> TaskEnd[T, R]:
     if failure == "error":
         return TaskEnd(task, None, failure, text, error)
     return TaskEnd(task, None, failure, str(error))
-
-
-@contextmanager
-def delayed_interrupts() -> Iterator[None]:
-    """Delay Ctrl-C, SIGTERM and SIGHUP to the end of the block.
-
-    A block that ends processes then ends all of them.
-    """
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    received: list[int] = []
-    before: dict[signal.Signals, Any] = {}
-    try:
-        for number in _SIGNALS_OF_END:
-            before[number] = signal.signal(number, lambda number, _: received.append(number))
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, signal.SIG_DFL if handler is None else handler)
-        if received:
-            signal.raise_signal(received[0])

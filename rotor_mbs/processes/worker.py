@@ -38,6 +38,9 @@ _ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM
 _PROGRAM = (
     "import sys; sys.path[:] = sys.argv[1:]; from rotor_mbs.processes.serving import serve; serve()"
 )
+_SIGNALS_OF_END = [
+    getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
+]
 _RETRY_START_S = 1.0  # pause after the system could not start a process
 _END_S = 1.0  # until a process whose pipe is closed has ended
 # Errors that are raised by a pipe if its other end is closed.
@@ -204,7 +207,10 @@ class Worker:
         beginning: Future[_Process] | None = None
         try:
             try:
-                beginning = _starter(os.getpid()).submit(self._begin)
+                # An interrupt just after the executor has started its thread would leave a thread
+                # that it does not know, and for which Python waits at its end.
+                with delayed_interrupts():
+                    beginning = _starter(os.getpid()).submit(self._begin)
             except RuntimeError as exc:
                 raise _not_started(str(exc)) from exc
             # `exception` returns an error of the start. An error that is raised here has another
@@ -432,6 +438,28 @@ def _block_interrupts() -> None:
     """Keep Ctrl-C from this thread and from the processes that it starts."""
     if hasattr(signal, "pthread_sigmask"):  # not on Windows
         signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+
+
+@contextmanager
+def delayed_interrupts() -> Iterator[None]:
+    """Delay Ctrl-C, SIGTERM and SIGHUP to the end of the block.
+
+    A block that ends processes then ends all of them, and one that starts a thread knows it.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    received: list[int] = []
+    before: dict[signal.Signals, Any] = {}
+    try:
+        for number in _SIGNALS_OF_END:
+            before[number] = signal.signal(number, lambda number, _: received.append(number))
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, signal.SIG_DFL if handler is None else handler)
+        if received:
+            signal.raise_signal(received[0])
 
 
 def memory_limit_text() -> str:

@@ -51,6 +51,38 @@ def _limited(kind: int, soft: int) -> Iterator[None]:
         resource.setrlimit(kind, limits)
 
 
+# An interrupt at the worst moment: the thread that starts processes runs, and its executor does not
+# know it yet.
+_INTERRUPTED_START = """
+import signal, threading
+from rotor_mbs.processes.worker import Worker
+
+start = threading.Thread.start
+
+def start_and_interrupt(thread):
+    start(thread)
+    threading.Thread.start = start
+    signal.raise_signal(signal.SIGINT)
+
+threading.Thread.start = start_and_interrupt
+try:
+    Worker().start()
+except KeyboardInterrupt:
+    print("interrupted")
+"""
+
+
+def test_an_interrupt_while_a_process_is_started_leaves_no_thread_to_wait_for() -> None:
+    ended = subprocess.run(
+        [sys.executable, "-c", _INTERRUPTED_START],
+        capture_output=True,
+        text=True,
+        timeout=_LONG_S,
+        check=False,
+    )
+    assert (ended.returncode, ended.stdout, ended.stderr) == (0, "interrupted\n", "")
+
+
 def test_a_time_out_under_a_memory_limit_is_no_end_of_a_task() -> None:
     """What lacks memory may wait for it; a limit far above what is used bounds nothing here."""
     with _limited(resource.RLIMIT_AS, 1 << 46), WorkerPool(1) as pool:
