@@ -21,7 +21,7 @@ from rotor_mbs.models.lagrange.hamilton import resting_pitches
 from rotor_mbs.models.lagrange.heyoka_adapter import is_available
 from rotor_mbs.models.lagrange.ode_solvers import OdeSolver, scipy_integrator
 from rotor_mbs.models.lagrange.parameters import pitch_weight, rate_units, rotor_form
-from rotor_mbs.models.lagrange.samples import loads_at, sampled_loads
+from rotor_mbs.models.lagrange.samples import loads_at, loads_over_time, sampled_loads
 from rotor_mbs.models.lagrange.singularity import least_inertia_shares
 from rotor_mbs.models.lagrange.taylor import Propagation, is_compact
 from rotor_mbs.scenario.scene import Scene
@@ -616,17 +616,19 @@ def quick_ends(
     equations = equations or closed_form.accelerations
     h = (ends - begins) / steps
 
+    # At a jump of a load at the end of an interval, take the value inside the interval.
+    earliest, latest = begins + _SIDE * h, ends - _SIDE * h
+    loads_inside = loads_over_time(scene)
+
     def derivative(at: Array, state: Array) -> Array:
         angles, rates = list(state[:half]), list(state[half:])
-        # At a jump of a load at the end of an interval, take the value inside the interval.
-        inside = np.clip(at, begins + _SIDE * h, ends - _SIDE * h)
-        accelerations = equations(angles, rates, form, loads_at(scene, inside), np.sin, np.cos)
-        return np.concatenate(
-            [
-                state[half:],
-                np.stack([np.broadcast_to(row, rates[0].shape) for row in accelerations]),
-            ]
-        )
+        loads = loads_inside(np.clip(at, earliest, latest))
+        accelerations = equations(angles, rates, form, loads, np.sin, np.cos)
+        change = np.empty(state.shape)
+        change[:half] = state[half:]
+        for i, row in enumerate(accelerations):  # a row may be one number for all intervals
+            change[half + i] = row
+        return change
 
     with np.errstate(all="ignore"):
         for number in range(steps):

@@ -192,10 +192,29 @@ def loads_at(scene: Scene, time: Array) -> LoadValues:
     LoadValues
         Of the coordinates that move: a number where a load is constant, else an array (n,).
     """
-    values: list[Any] = []
-    for table in scene.load_tables:
-        values.append(value_at(table, 0.0) if is_constant(table) else values_at(table, time))
-    return load_values(values, scene.moving_coordinates[1:])
+    return loads_over_time(scene)(time)
+
+
+def loads_over_time(scene: Scene) -> Callable[[Array], LoadValues]:
+    """Return a function that evaluates the loads at some times, as `loads_at` does.
+
+    Parameters
+    ----------
+    scene : whose load tables are evaluated.
+    """
+    tables, pitches = scene.load_tables, scene.moving_coordinates[1:]
+    constants = [value_at(table, 0.0) if is_constant(table) else None for table in tables]
+    if None not in constants:
+        constant_loads = load_values(constants, pitches)
+        return lambda _time: constant_loads
+
+    def at(time: Array) -> LoadValues:
+        values: list[Any] = []
+        for table, constant in zip(tables, constants, strict=True):
+            values.append(values_at(table, time) if constant is None else constant)
+        return load_values(values, pitches)
+
+    return at
 
 
 def loads_at_start(scene: Scene, torque: float = 0.0) -> LoadValues:
