@@ -4,8 +4,12 @@ read."""
 from __future__ import annotations
 
 import os
+import pickle
 import signal
+import warnings
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any, Self
 
 import pytest
 
@@ -31,3 +35,30 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = results_file(tmp_path_factory.mktemp("results") / "results.h5", scenes, methods)
     path.chmod(0o444)
     return path
+
+
+class _WorkerHere:
+    """A worker that calls its functions in this process; their results are pickled all the same."""
+
+    def __init__(self, **_options: object) -> None:
+        pass
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        pass
+
+    def run(self, work: Callable[[Any], Any], task: Any, _timeout_s: float) -> Any:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # as in the process, whose output is dropped
+            return pickle.loads(pickle.dumps(work(task)))
+
+
+@pytest.fixture
+def files_read_here(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Files of other programs are read in this process: to start one that loads pandas takes longer
+    than most tests of columns and verdicts."""
+    from rotor_mbs.comparison import files  # late: few tests need it
+
+    monkeypatch.setattr(files, "Worker", _WorkerHere)

@@ -18,6 +18,8 @@ from rotor_mbs.api.comparisons import DataComparison
 from rotor_mbs.studies.modes import compute_modes
 
 Array = Any
+pytestmark = pytest.mark.usefixtures("files_read_here")
+
 SPEEDS = np.linspace(0.0, 3.0, 5)
 DAMPED, SPRUNG, UNEQUAL = "stiff/nrel-5mw-damped", "stiff/nrel-5mw", "check/general"
 

@@ -18,6 +18,8 @@ import rotor_mbs as rm
 from rotor_mbs.scenario.scene import Scene
 
 Array = Any
+pytestmark = pytest.mark.usefixtures("files_read_here")
+
 PROGRAM = {"program": "openfast"}
 
 

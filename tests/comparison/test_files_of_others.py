@@ -24,6 +24,8 @@ from rotor_mbs.comparison.formats import read_in_worker
 from rotor_mbs.comparison.units import unit_factor
 from rotor_mbs.errors import InputError
 
+pytestmark = pytest.mark.usefixtures("files_read_here")
+
 SCENE = paper("fig11", duration=1.0, samples=101)
 TIME = np.linspace(0.0, 1.0, 101)
 ANGLES = np.stack(

@@ -20,6 +20,9 @@ from rotor_mbs.comparison.channels import channel_from_name, channels
 from rotor_mbs.comparison.data import load_data, rounding_of_printed
 from rotor_mbs.errors import InputError, RotorError
 
+APART = ("data.csv", "data.nc")  # read apart as all others: those are marked full
+in_this_process = pytest.mark.usefixtures("files_read_here")
+
 SCENE = paper("fig08")
 TIME = np.linspace(0.0, 10.0, 201)
 ANGLES = np.stack(
@@ -31,6 +34,7 @@ RATES = np.stack(
 STATES = np.hstack([ANGLES, RATES])
 
 
+@in_this_process
 @pytest.mark.parametrize("name", FORMATS)
 def test_every_format_gives_the_same_numbers(tmp_path: Path, name: str) -> None:
     if name.endswith(".outb"):
@@ -93,6 +97,7 @@ REAL_LIFE = {
 }
 
 
+@in_this_process
 @pytest.mark.parametrize("name", REAL_LIFE)
 def test_text_as_other_programs_write_it(tmp_path: Path, name: str) -> None:
     encoding = "utf-16" if name.startswith("Unicode") else "utf-8"
@@ -187,6 +192,7 @@ def test_the_last_digit_of_single_and_double_precision_and_of_few_values() -> No
     assert rounding_of_printed(np.array([1.0 / 3.0, 2.0 / 3.0, 5e-324])).max() < 1e-15
 
 
+@in_this_process
 def test_a_mapping_says_column_unit_sign_zero_and_subset(tmp_path: Path) -> None:
     path = tmp_path / "mine.csv"
     table = np.column_stack(
@@ -205,6 +211,7 @@ def test_a_mapping_says_column_unit_sign_zero_and_subset(tmp_path: Path) -> None
     assert data.read[1] == "rotor = -('a' +90) [deg]"
 
 
+@in_this_process
 def test_results_of_this_program_are_data_too(results: Path, tmp_path: Path) -> None:
     with pytest.raises(RotorError, match=r"several groups; .*paper/fig08/exudyn_tree/rk67"):
         load_data(results, SCENE)
@@ -286,6 +293,7 @@ WRONG: dict[str, tuple[Callable[[Path], object], str]] = {
 }
 
 
+@in_this_process
 @pytest.mark.parametrize("case", WRONG)
 def test_wrong_input_is_one_line_and_status_2(tmp_path: Path, case: str) -> None:
     make, message = WRONG[case]
@@ -314,6 +322,7 @@ def test_wrong_arrays_are_refused(arrays: Any, message: str) -> None:
         load_data(arrays, SCENE)
 
 
+@in_this_process
 @pytest.mark.parametrize(
     ("mapping", "message"),
     [
@@ -356,7 +365,10 @@ def test_without_its_package_a_binary_openfast_file_says_how_to_get_it(
         load_data(tmp_path / "data.outb", SCENE)
 
 
-@pytest.mark.parametrize("name", FORMATS)
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=() if name in APART else pytest.mark.full) for name in FORMATS],
+)
 def test_a_reader_that_ends_its_process_is_a_line(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -260,7 +260,13 @@ def test_reading_has_a_limit_of_memory(tmp_path: Path, monkeypatch: pytest.Monke
     assert "takes more memory than 0.372529 GB" in refusal_of(tmp_path / "data.npz")
 
 
-@pytest.mark.parametrize("name", FORMATS)
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=() if name in ("data.txt", "data.npz") else pytest.mark.full)
+        for name in FORMATS
+    ],
+)
 def test_reading_has_a_limit_of_time(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

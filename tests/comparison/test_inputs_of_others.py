@@ -23,20 +23,11 @@ from support import references
 from support.scenes import paper
 
 import rotor_mbs as rm
-from rotor_mbs.comparison import data as comparison_data
-from rotor_mbs.comparison.formats import read_in_worker
+
+pytestmark = pytest.mark.usefixtures("files_read_here")
 
 SCENE = paper("fig11", duration=1.0, samples=101)
 Array = Any
-
-
-@pytest.fixture(autouse=True)
-def _files_are_read_here(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(
-        comparison_data,
-        "read_table",
-        lambda path, group, scene: read_in_worker((Path(path), group, scene)),
-    )
 
 
 @pytest.fixture(scope="module")
