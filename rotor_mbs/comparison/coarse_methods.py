@@ -32,9 +32,7 @@ def _semi_implicit_euler(derivative: Derivative, time: Array, state: Array, h: A
 def _implicit_euler(derivative: Derivative, time: Array, state: Array, h: Array) -> Array:
     """Return the state after an implicit Euler step, solved by iteration."""
     end = _euler(derivative, time, state, h)
-    for _ in range(_ITERATIONS):
-        end = state + h * derivative(time + h, end)
-    return end
+    return _iterated(lambda end: state + h * derivative(time + h, end), end)
 
 
 def _heun(derivative: Derivative, time: Array, state: Array, h: Array) -> Array:
@@ -52,9 +50,17 @@ def _midpoint(derivative: Derivative, time: Array, state: Array, h: Array) -> Ar
 def _trapezoidal(derivative: Derivative, time: Array, state: Array, h: Array) -> Array:
     """Return the state after a step of the trapezoidal rule, solved by iteration."""
     first = derivative(time, state)
-    end = state + h * first
+    return _iterated(
+        lambda end: state + 0.5 * h * (first + derivative(time + h, end)), state + h * first
+    )
+
+
+def _iterated(following: Callable[[Array], Array], end: Array) -> Array:
+    """Return what some iterations make of the state at the end of an implicit step."""
     for _ in range(_ITERATIONS):
-        end = state + 0.5 * h * (first + derivative(time + h, end))
+        before, end = end, following(end)
+        if np.array_equal(before, end):  # as all further ones would be
+            break
     return end
 
 
