@@ -43,7 +43,7 @@ def rotor(**changes: object) -> Scene:
 
 
 def output_of(scene: Scene, **numbers: float) -> dict[str, tuple[str, Array]]:
-    run = rm.run(scene, "lagrange/dop853")
+    run = rm.run(scene, "reference")
     return columns_of(scene, run.time, run.angles, run.rates, **numbers)
 
 

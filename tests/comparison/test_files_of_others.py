@@ -526,7 +526,7 @@ def test_a_mapping_adds_to_what_is_known_by_name() -> None:
 
 
 def test_loads_that_are_left_out_are_said_and_no_ok_stands_without_them() -> None:
-    run = rm.run(SCENE, "lagrange/dop853")
+    run = rm.run(SCENE, "reference")
     arrays = {
         "time": run.time,
         "angles": run.angles,
@@ -549,7 +549,7 @@ def test_loads_that_are_left_out_are_said_and_no_ok_stands_without_them() -> Non
 
 
 def test_rates_by_der_are_judged() -> None:
-    run = rm.run(SCENE, "lagrange/dop853")
+    run = rm.run(SCENE, "reference")
     arrays = {"time": run.time, "phi": run.angles[:, 0], "der(phi)": 1.7 * run.rates[:, 0]}
     arrays |= entries("theta{}", 1, run.angles[:, 1:])
     found = rm.compare(arrays, SCENE)
