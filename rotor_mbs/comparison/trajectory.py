@@ -56,6 +56,9 @@ _STAGES = 4  # reference, interval defects, search for causes, loads
 _SAME_START = 1e-3  # rad, rad/s: starts that differ by more are another start
 # A cause explains errors within the tolerance if at most this share of them is left.
 _LEFT_OF_SMALL_ERRORS = 0.02
+# References that are kept for further data of the same scene and times: some of 20,000 rows take
+# 20 MB.
+_MAX_KEPT, _MAX_KEPT_ROWS = 4, 20_000
 _MAX_GAP = 1.5  # largest number of intervals without rows at the start or end of the motion
 
 
@@ -164,7 +167,6 @@ def compare_with_reference(
         with time_limit(time_limit_s):
             on_stage("reference", 0, _STAGES)
             inside, exact = _reference_for(data, scene)
-            raise_if_over()  # a reference that ended early is not used
             missing_part = "the rows are not assessed"
             on_stage("interval defects", 1, _STAGES)
             rows = _rows_with_reference(data, scene, inside, exact)
@@ -263,7 +265,38 @@ def _reference_for(data: ForeignData, scene: Scene) -> tuple[ForeignData, TimedR
     samples = np.linspace(0.0, scene.duration, scene.samples)
     times = np.union1d(np.append(inside.time, end), samples)
     sampled_scene = replace(scene, duration=end, samples=len(times), outputs=("angles", "rates"))
-    return inside, reference_at(sampled_scene, times)
+    return inside, _reference_at(sampled_scene, times)
+
+
+_kept: dict[tuple[object, ...], TimedReference] = {}  # the latest last
+
+
+def _reference_at(scene: Scene, times: Array) -> TimedReference:
+    """Return the reference of a scene at given times, which earlier data may have had as well.
+
+    Parameters
+    ----------
+    scene, times : as of `reference_at`.
+
+    Raises
+    ------
+    OutOfTimeError
+        If it ended early, at the time limit: it is not used.
+    """
+    # How it is computed belongs to the key: with or without the engine.
+    key = (reference_at, is_available(), scene, times.tobytes())
+    exact = _kept.pop(key, None)
+    if exact is None:
+        exact = reference_at(scene, times)
+        raise_if_over()
+        run = exact.trajectory
+        for array in (run.time, run.angles, run.rates, exact.growth, exact.units):
+            array.flags.writeable = False  # others will read it
+    if len(times) <= _MAX_KEPT_ROWS:
+        _kept[key] = exact
+        for old in list(_kept)[:-_MAX_KEPT]:
+            _kept.pop(old, None)  # another thread may have removed it
+    return exact
 
 
 def _rows_with_reference(

@@ -197,7 +197,13 @@ FAULTS: dict[str, tuple[Callable[[], dict[str, Array]], str]] = {
 }
 
 
-@pytest.mark.parametrize("fault", FAULTS)
+@pytest.mark.parametrize(
+    "fault",
+    [
+        pytest.param(name, marks=() if name in ("coned", "apex", "hub") else pytest.mark.full)
+        for name in FAULTS
+    ],
+)
 def test_a_mistake_in_loads_is_named(fault: str) -> None:
     change, text = FAULTS[fault]
     data = motion(SCENE) | {load: stored(load) for load in LOADS} | change()

@@ -16,6 +16,7 @@ from support.commands import rotor_mbs
 from support.data_files import FORMATS
 
 import rotor_mbs as rm
+from rotor_mbs.comparison import trajectory
 from rotor_mbs.comparison.verdict import as_dictionary, verdict_of
 from rotor_mbs.models.lagrange import reference
 from rotor_mbs.runs.read import read_records, write_records
@@ -75,6 +76,34 @@ def test_the_reference_at_the_times_of_the_data_is_the_frozen_one() -> None:
     found = reference.reference_at(replace(scene, samples=len(time)), time).trajectory
     at = np.searchsorted(time, frozen.time)
     assert found.angles[at].tobytes() == frozen.angles.tobytes()
+
+
+def test_the_reference_is_kept_for_further_data_of_the_same_times(
+    run: rm.Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Another scene or other times have another one; of many, the latest are kept."""
+    asked = []
+
+    def counted(scene: Scene, times: np.ndarray) -> reference.TimedReference:
+        asked.append(scene.gravity)
+        return reference.reference_at(scene, times)
+
+    monkeypatch.setattr(trajectory, "reference_at", counted)
+    data = {"time": run.time[:9], "angles": run.angles[:9], "rates": run.rates[:9]}
+    scene = scene_of("paper/fig03", float(run.time[8]))
+    assert rm.compare(data, scene).status == "ok"
+    assert rm.compare(data | {"angles": 1.1 * run.angles[:9]}, scene).status == "inaccurate"
+    assert len(asked) == 1
+    times = run.time[:9]
+    kept = trajectory._reference_at(scene, times)
+    assert trajectory._reference_at(scene, times) is kept
+    with pytest.raises(ValueError, match="read-only"):
+        kept.trajectory.angles[0, 0] = 1.0
+    asked.clear()
+    for gravity in (9.7, 9.6, 9.5, 9.7, 9.4, 9.7, 9.3, 9.7, 9.6):
+        trajectory._reference_at(replace(scene, gravity=gravity), times)
+    assert asked == [9.7, 9.6, 9.5, 9.4, 9.3, 9.6]
+    assert len(trajectory._kept) == 4
 
 
 def test_growth_of_each_channel_is_at_most_that_of_all(monkeypatch: pytest.MonkeyPatch) -> None:
