@@ -101,8 +101,17 @@ def test_a_fault_of_twice_the_smallest_is_seen(name: str) -> None:
     assert judge_faults(name, row) > 0
 
 
-@pytest.mark.full
-@pytest.mark.parametrize("group", GROUPS)
+# The groups of most scenes take half a minute.
+@pytest.mark.parametrize(
+    "group",
+    [
+        pytest.param(
+            group,
+            marks=pytest.mark.nightly if group in ("extreme", "paper") else pytest.mark.full,
+        )
+        for group in GROUPS
+    ],
+)
 def test_a_fault_of_twice_the_smallest_is_seen_in_every_scene(group: str) -> None:
     judged = []
     for name in referenced(group):

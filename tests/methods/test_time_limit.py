@@ -383,8 +383,8 @@ A_FILE_MAY_STAY_OPEN = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisab
 
 
 @pytest.mark.parametrize("error", [Late, pytest.param(TimeoutError, marks=pytest.mark.full),
-                                   pytest.param(RuntimeError, marks=pytest.mark.full),
-                                   pytest.param(ValueError, marks=pytest.mark.full),
+                                   pytest.param(RuntimeError, marks=pytest.mark.nightly),
+                                   pytest.param(ValueError, marks=pytest.mark.nightly),
                                    pytest.param(pytest.fail.Exception, marks=pytest.mark.full)])  # fmt: skip
 @pytest.mark.parametrize("timeout", [100.0, float("inf")])
 @pytest.mark.parametrize("method", METHODS)
