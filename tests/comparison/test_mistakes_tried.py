@@ -10,6 +10,8 @@ from support.mistaken_data import ALL, MARKER, MISTAKES, compared, verdict_of
 
 import rotor_mbs as rm
 
+pytestmark = pytest.mark.usefixtures("files_read_here")
+
 DOCUMENT = Path(__file__).parents[2] / "docs" / "mistakes-tried.md"
 # Of which a search finds no cause: the mistake is refused, and that is all.
 NOT_NAMED = {"e50", "i03", "i04", "i08", "x12"}
