@@ -116,7 +116,17 @@ def test_the_chain_while_errors_grow_little(case: str, name: str) -> None:
     assert angle_error(solve(method, scene, settings).trajectory, exact).max() <= bound
 
 
-@pytest.mark.parametrize("name", ["fig03", "fig05", "fig06", "fig08", "fig15-100kNm"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "fig03",
+        "fig08",
+        *(
+            pytest.param(name, marks=pytest.mark.full)
+            for name in ("fig05", "fig06", "fig15-100kNm")
+        ),
+    ],
+)
 @pytest.mark.parametrize("method", BEST[:2])
 def test_blades_that_start_at_zero_pitch_stay_there(name: str, method: str) -> None:
     """An invariant set, unstable: one rounding error off it would be 1e30 away by the end."""
