@@ -83,8 +83,7 @@ def accelerations(
     ----------
     angles, rates : of the rotor, then of the pitches that move: 1 + len(form.blades) in rad and
         rad/s.
-    form : the coefficients; stacked, all pitches are one entry of angles, rates, loads and result,
-        an array with a row for each.
+    form : the coefficients.
     loads : the loads of the coordinates that move.
     sin, cos : for the kind of number.
 
@@ -94,7 +93,7 @@ def accelerations(
         rad/s², rotor, then pitches.
     """
     sin_q, cos_q = sin(angles[0]), cos(angles[0])
-    spin, spin_squared = rates[0], rates[0] * rates[0]
+    spin = rates[0]
     schur = form.inertia
     moment = loads.rotor - form.shaft_damping * spin
     for weight, cos_phase, sin_phase in form.fixed:
@@ -103,10 +102,10 @@ def accelerations(
     # of them.
     pitched = []
     for blade, theta, rate, torque, rest in pitches(form, angles, rates, loads):
-        s, c, rate_squared = sin(theta), cos(theta), rate * rate
+        s, c = sin(theta), cos(theta)
         sin_phi = sin_q * blade.cos_phase + cos_q * blade.sin_phase
         cos_phi = cos_q * blade.cos_phase - sin_q * blade.sin_phase
-        s_turn, c_turn = s * spin_squared, c * spin_squared
+        s_turn, c_turn = s * (spin * spin), c * (spin * spin)
         ratio = blade.ratio_s * s + blade.ratio_c * c  # B / Jzz, without tilt and cone
         resistance = blade.stiffness * (theta - rest) + blade.damping * rate - torque
         # ½ ∂A/∂θ Ω² and gravity, both on the pitch: s·on_s + c·on_c
@@ -120,32 +119,26 @@ def accelerations(
         lean = blade.lean
         if lean:
             up = lean.axial - lean.radial * cos_phi
-            on_s = on_s + lean.slope_s * spin_squared + lean.weight_y * up
-            on_c = on_c + lean.slope_c * spin_squared - lean.weight_x * up
-            ratio, drag = ratio + lean.ratio, drag + lean.ratio * spin_squared
+            on_s = on_s + lean.slope_s * (spin * spin) + lean.weight_y * up
+            on_c = on_c + lean.slope_c * (spin * spin) - lean.weight_x * up
+            ratio, drag = ratio + lean.ratio, drag + lean.ratio * (spin * spin)
         pitched.append((s, c, on_s, on_c, resistance))
         lever = blade.lever_cc * c + blade.lever_sc * s
-        rotor_c = blade.weight_x * cos_phi + sin_phi * lever - blade.coupling_s * rate_squared
+        rotor_c = blade.weight_x * cos_phi + sin_phi * lever - blade.coupling_s * (rate * rate)
         rotor_c = rotor_c - blade.half_slope_sc * (s * drag) - blade.half_slope_cs * (c * drag)
         rotor_s = (
             blade.lever_ss * (s * sin_phi)
             - blade.weight_y * cos_phi
-            + blade.coupling_c * rate_squared
+            + blade.coupling_c * (rate * rate)
         )
         rotor_s = rotor_s + blade.half_slope_cs * (s * drag)
         if lean:
             rotor_c = rotor_c - lean.slope_c * drag + lean.weight_x * (ratio * up)
             rotor_s = rotor_s - lean.slope_s * drag - lean.weight_y * (ratio * up)
-        of_schur = blade.schur_ss * (s * s) + blade.schur_cc * (c * c) + blade.schur_sc * (s * c)
-        driving, resisting = c * rotor_c + s * rotor_s, ratio * resistance
-        if form.is_stacked:
-            # The sums have the order of the blades, as without the stack.
-            for i in range(len(driving)):
-                moment = moment + driving[i] + resisting[i]
-                schur = schur + of_schur[i]
-        else:
-            moment = moment + driving + resisting
-            schur = schur + of_schur
+        moment = moment + (c * rotor_c + s * rotor_s) + ratio * resistance
+        schur = schur + (
+            blade.schur_ss * (s * s) + blade.schur_cc * (c * c) + blade.schur_sc * (s * c)
+        )
     rotor = moment / schur
     result = [rotor]
     for blade, (s, c, on_s, on_c, resistance) in zip(form.blades, pitched, strict=True):

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,17 +16,11 @@ from numpy.typing import NDArray
 from rotor_mbs.errors import InputError
 from rotor_mbs.methods.time_limit import raise_if_over
 from rotor_mbs.models.lagrange import closed_form
-from rotor_mbs.models.lagrange.closed_form import Accelerations, LoadValues, load_values
+from rotor_mbs.models.lagrange.closed_form import Accelerations, load_values
 from rotor_mbs.models.lagrange.hamilton import resting_pitches
 from rotor_mbs.models.lagrange.heyoka_adapter import is_available
 from rotor_mbs.models.lagrange.ode_solvers import OdeSolver, scipy_integrator
-from rotor_mbs.models.lagrange.parameters import (
-    Number,
-    pitch_weight,
-    rate_units,
-    rotor_form,
-    stacked,
-)
+from rotor_mbs.models.lagrange.parameters import pitch_weight, rate_units, rotor_form
 from rotor_mbs.models.lagrange.samples import loads_at, loads_over_time, sampled_loads
 from rotor_mbs.models.lagrange.singularity import least_inertia_shares
 from rotor_mbs.models.lagrange.taylor import Propagation, is_compact
@@ -619,30 +613,21 @@ def quick_ends(
     """
     step = step or runge_kutta_step
     form, half = rotor_form(scene), len(states) // 2
+    equations = equations or closed_form.accelerations
     h = (ends - begins) / steps
+
     # At a jump of a load at the end of an interval, take the value inside the interval.
     earliest, latest = begins + _SIDE * h, ends - _SIDE * h
     loads_inside = loads_over_time(scene)
-    is_stacked = equations is None and half > 2
-    if is_stacked:
-        # All blades at once: for some hundred intervals, the time is that of the calls of NumPy.
-        form = stacked(form, states.ndim)
-        loads_inside = _stacked_loads(loads_inside, states.ndim, scene.has_constant_loads)
-    accelerations = equations or closed_form.accelerations
 
     def derivative(at: Array, state: Array) -> Array:
         angles, rates = list(state[:half]), list(state[half:])
-        if is_stacked:
-            angles, rates = [state[0], state[1:half]], [state[half], state[half + 1 :]]
         loads = loads_inside(np.clip(at, earliest, latest))
-        rows = accelerations(angles, rates, form, loads, np.sin, np.cos)
+        accelerations = equations(angles, rates, form, loads, np.sin, np.cos)
         change = np.empty(state.shape)
         change[:half] = state[half:]
-        if is_stacked:
-            change[half], change[half + 1 :] = rows
-        else:
-            for i, row in enumerate(rows):  # it may be one number for all intervals
-                change[half + i] = row
+        for i, row in enumerate(accelerations):  # a row may be one number for all intervals
+            change[half + i] = row
         return change
 
     with np.errstate(all="ignore"):
@@ -650,30 +635,3 @@ def quick_ends(
             at = begins + number * h
             states = step(derivative, at, states, h)
     return states
-
-
-def _stacked_loads(
-    loads_at_times: Callable[[Array], LoadValues], dimensions: int, is_constant: bool
-) -> Callable[[Array], LoadValues]:
-    """Return a function that evaluates loads, with those of all pitches as one array of rows.
-
-    Parameters
-    ----------
-    loads_at_times : of times (n,), returns numbers and arrays (n,).
-    dimensions : of the arrays of angles and rates, whose last one is the times.
-    is_constant : whether no load changes.
-    """
-
-    def one_array(values: Sequence[Number]) -> Sequence[Array]:
-        rows = np.stack(np.broadcast_arrays(*values))
-        between = (1,) * (dimensions - 2)
-        return [rows.reshape(len(rows), *between, rows.size // len(rows))]
-
-    def at(times: Array) -> LoadValues:
-        loads = loads_at_times(times)
-        return LoadValues(loads.rotor, one_array(loads.pitches), one_array(loads.rests))
-
-    if is_constant:
-        constant = at(np.empty(0))
-        return lambda _times: constant
-    return at

@@ -9,7 +9,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
 
@@ -102,30 +102,6 @@ class RotorForm:
     inertia: Number  # kg m², hub and the blades that are fixed
     shaft_damping: Number  # N m s/rad
     fixed_height: Number = 0.0  # N m, constant potential energy of the blades that are fixed
-    is_stacked: bool = False  # whether all blades are one whose coefficients are arrays, a row each
-
-
-def stacked(form: RotorForm, dimensions: int) -> RotorForm:
-    """Return the coefficients with all blades as one, for equations that compute them at once.
-
-    Parameters
-    ----------
-    form : of at least one blade whose pitch moves.
-    dimensions : of the arrays of angles and rates of all pitches, whose first one is the pitches.
-    """
-
-    def column(parts: Sequence[Any], name: str) -> Array:
-        values = [getattr(part, name) for part in parts]
-        return np.reshape(values, (-1,) + (1,) * (dimensions - 1))
-
-    names = [field.name for field in fields(BladeForm) if field.name != "lean"]
-    columns: list[Any] = [column(form.blades, name) for name in names]
-    blade = BladeForm(*columns)
-    if form.blades[0].lean:  # all blades have it, or none
-        leans = [part.lean for part in form.blades]
-        lean = LeanForm(*(column(leans, field.name) for field in fields(LeanForm)))
-        blade = replace(blade, lean=lean)
-    return replace(form, blades=(blade,), is_stacked=True)
 
 
 def rotor_form(
