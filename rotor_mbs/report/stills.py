@@ -158,9 +158,13 @@ def _ticks(first: float, last: float, most: int, *, is_log: bool) -> list[tuple[
     step = factor * unit
     multiples = range(math.ceil(first / step - 1e-9), math.floor(last / step + 1e-9) + 1)
     places = [float(f"{multiple * step:.9g}") for multiple in multiples]
-    return [
-        (place, minus(typeset(f"{place:.9g}"))) for place in places if place > 0.0 or not is_log
-    ]
+    shown = [place for place in places if place > 0.0 or not is_log]
+    texts = [f"{place:.9g}" for place in shown]
+    if not any("e" in text for text in texts):
+        # All have the decimals of the longest: 1.270 beside 1.268. Zero has none.
+        decimals = max((len(text.partition(".")[2]) for text in texts), default=0)
+        texts = [f"{place:.{decimals}f}" if place else "0" for place in shown]
+    return [(place, minus(typeset(text))) for place, text in zip(shown, texts, strict=True)]
 
 
 def _drawn(

@@ -47,7 +47,6 @@
 
   // Places and texts of at most `most` round ticks; of a short logarithmic axis those of a linear one.
   const ticks = (from, to, most, isLog) => {
-    const found = [];
     if (isLog) {
       const step = Math.max(1, Math.ceil((Math.log10(to) - Math.log10(from)) / most));
       const exponents = [];
@@ -60,12 +59,15 @@
     const count = (step) => Math.floor(to / step + 1e-9) - Math.ceil(from / step - 1e-9) + 1;
     let place = steps.findIndex((step) => step >= rough * (1 - 1e-9));
     if (place > 0 && count(steps[place]) < 2) place -= 1;  // one number tells nothing of the scale
-    const step = steps[place];
+    const step = steps[place], values = [];
     for (let i = Math.ceil(from / step - 1e-9); i <= to / step + 1e-9; i++) {
       const value = Number((i * step).toPrecision(9));
-      if (value > 0 || !isLog) found.push([value, brief(value)]);
+      if (value > 0 || !isLog) values.push(value);
     }
-    return found;
+    // All have the decimals of the longest, 1.270 beside 1.268; zero, and powers of ten, have their own.
+    const labels = values.map(brief), isPlain = !labels.some((label) => label.includes("×"));
+    const decimals = Math.max(0, ...labels.map((label) => label.split(".")[1]?.length ?? 0));
+    return values.map((value, i) => [value, isPlain && value ? value.toFixed(decimals).replace("-", "−") : labels[i]]);
   };
 
   // ---- Columns
@@ -204,7 +206,11 @@
       const limits = range(from, to), [low, high] = limits;
       const labels = ticks(low, high, plot.log ? 5 : Math.max(2, Math.floor(plot.height / 38)), plot.log);
       left = Math.max(34, 13 + LETTER * Math.max(0, ...labels.map(([, label]) => label.length)));
-      const names = ends(to, limits), longest = Math.max(0, ...names.map(([name]) => name.length));
+      // Long names that would take more than a third of the width are in the legend alone.
+      const isLong = ({ length }) => length > 4 && LETTER * length > (width - left) / 3;
+      let names = ends(to, limits);
+      if (names.some(([name]) => isLong(name))) names = names.filter(([name]) => name.length <= 4);
+      const longest = Math.max(0, ...names.map(([name]) => name.length));
       right = width - Math.max(RIGHT, longest && LETTER * longest + 8);
       sx = scale(from, to, left, right, axis.log);
       sy = scale(low, high, bottom, TOP, plot.log);
