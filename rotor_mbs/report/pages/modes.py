@@ -39,7 +39,7 @@ from rotor_mbs.report.elements import (
     Section,
     TableCell,
 )
-from rotor_mbs.report.looks import BLUE, GREY, VERMILLION, Look, coordinate_look
+from rotor_mbs.report.looks import BLUE, GREY, VERMILLION, Look, coordinate_look, with_capital
 from rotor_mbs.report.numbers import (
     NOTHING,
     SPACE,
@@ -49,13 +49,14 @@ from rotor_mbs.report.numbers import (
     typeset_title,
     up_to,
 )
-from rotor_mbs.report.pages import is_wide
 from rotor_mbs.scenario.keys import counted
 from rotor_mbs.solution.trajectory import Array
 
 _MARKS = ("o", "s", "^", "D", "v", "P", "x")
 _TURN = 2.0 * math.pi
 _ZERO = 1e-6  # share of the largest frequency; below it is that of a rigid motion
+_FLAT = 1e-3  # share of a damping ratio or growth rate; a smaller change is not magnified
+_TALL = 30.0  # of moduli; larger ones are drawn over a logarithmic axis
 _NOTHING = 1e-9  # 1/s, or of a frequency: a smaller growth or damping is rounding error
 
 
@@ -268,24 +269,14 @@ def _first(kind: Mapping[str, LinearModes]) -> LinearModes | None:
 def mode_answer(scene: SceneModes) -> list[Markup]:
     """Return sentences: faults, agreement of the models, frequencies at rest, and stability.
 
+    The agreement of the models comes last; where they do not agree it comes first.
+
     Parameters
     ----------
     scene : the modes of one scene.
     """
     sentences = []
     models = max(len(scene.rest), len(scene.rotation))
-    for fault in scene.faults:
-        sentences.append(Markup('<span class="bad">{}: {}</span>.').format(scene.label, fault))
-    if models > 1:
-        how = Markup("agree within <b>{}</b> of the largest eigenvalue")
-        if scene.disagreement > AGREEMENT:
-            how = Markup(
-                '<span class="bad">do not agree: they differ by {} of the largest eigenvalue</span>'
-            )
-        how = how.format(_difference(scene))
-        sentences.append(
-            Markup("{}: the modes of {} models {}.").format(scene.label, in_words(models), how)
-        )
     rest = _first(scene.rest)
     if rest is not None:
         known = [
@@ -299,14 +290,14 @@ def mode_answer(scene: SceneModes) -> list[Markup]:
             text = f"{number(low / _TURN, 4)}{SPACE}Hz"
             if high > 1.001 * low:
                 text = f"{number(low / _TURN, 4)} to {number(high / _TURN, 4)}{SPACE}Hz"
-            sentences.append(Markup("At rest its natural frequencies are <b>{}</b>.").format(text))
+            sentences.append(Markup("at rest its natural frequencies are <b>{}</b>.").format(text))
     table = scene.floquet
     if table is not None and len(table.speeds):
         unstable = table.speeds[table.stable == 0]
         known_count = int((table.stable != -1).sum())
         if len(unstable):
             text = Markup(
-                'Under gravity its rotation is <span class="bad">unstable at {} of {} '
+                'under gravity its rotation is <span class="bad">unstable at {} of {} '
                 "speeds</span>, {}."
             )
             ends = [number(float(end) * RPM, 3) for end in (unstable.min(), unstable.max())]
@@ -314,10 +305,27 @@ def mode_answer(scene: SceneModes) -> list[Markup]:
             sentences.append(text.format(len(unstable), known_count, where))
         elif known_count:
             every = "all" if known_count == len(table.speeds) else f"{known_count} of"
-            text = Markup("Under gravity its rotation is <b>stable at {} {} speeds</b>, up to {}.")
+            text = Markup("under gravity its rotation is <b>stable at {} {} speeds</b>, up to {}.")
             highest = f"{number(float(table.speeds[table.stable != -1].max()) * RPM, 3)}{SPACE}rpm"
             sentences.append(text.format(every, len(table.speeds), highest))
-    return sentences
+    if models > 1:
+        how = Markup("agree within <b>{}</b> of the largest eigenvalue")
+        place = len(sentences)
+        if scene.disagreement > AGREEMENT:
+            how = Markup(
+                '<span class="bad">do not agree: they differ by {} of the largest eigenvalue</span>'
+            )
+            place = 0
+        how = how.format(_difference(scene))
+        sentences.insert(place, Markup("the modes of {} models {}.").format(in_words(models), how))
+    faults = [
+        Markup('<span class="bad">{}: {}</span>.').format(scene.label, fault)
+        for fault in scene.faults
+    ]
+    if not sentences:
+        return faults
+    first = Markup("{}: {}").format(scene.label, sentences[0])
+    return [*faults, first, *map(with_capital, sentences[1:])]
 
 
 def _difference(scene: SceneModes) -> str:
@@ -358,7 +366,10 @@ def _facts(scene: SceneModes) -> list[Fact]:
         largest = float(np.nanmax(scene.floquet.largest))
         is_bad = bool((scene.floquet.stable == 0).any())
         note = "of a Floquet multiplier under gravity; above 1 is unstable"
-        facts.append(Fact("Largest modulus", number(largest, 6), note, "bad" if is_bad else ""))
+        digits = 6 if abs(largest - 1.0) < 0.01 else 3  # near 1 the difference from it counts
+        facts.append(
+            Fact("Largest modulus", number(largest, digits), note, "bad" if is_bad else "")
+        )
     return facts
 
 
@@ -551,7 +562,8 @@ def _damping(rotation: LinearModes, name: str, axis: Horizontal) -> Section | No
         curves = []
         for (key, look), column in zip(items, values.T, strict=True):
             curves.append(Curve(key, look, rotation.speeds * RPM, column))
-        cards.append([Plot(title, unit, axis, curves, 200, least=_NOTHING)])
+        least = max(_NOTHING, _FLAT * float(np.nanmax(np.abs(values), initial=0.0)))
+        cards.append([Plot(title, unit, axis, curves, 200, least=least)])
     return Section(f"{name}-damping", "Damping over speed", [Legend(items), Grid(2, cards)])
 
 
@@ -577,7 +589,8 @@ def _turning(scene: SceneModes, name: str, axis_name: str) -> Section | None:
     ]
     largest = Curve(f"{name} largest", Look(VERMILLION, "-", "", "largest"), speeds, table.largest)
     known = shown[np.isfinite(shown)]
-    is_log = is_wide(known)
+    # What matters is which are above 1: small ones would take the range of a logarithmic axis.
+    is_log = float(known.max(initial=0.0)) > _TALL
     mark = [Mark("1: above it the motion is unstable", y=1.0)]
     plot = Plot(
         "Modulus of the multipliers",
@@ -585,6 +598,7 @@ def _turning(scene: SceneModes, name: str, axis_name: str) -> Section | None:
         axis,
         [*each, largest],
         240,
+        clip=(1.0 / _TALL, 2.0 * float(known.max())) if is_log else None,
         log=is_log,
         marks=mark,
         least=10.0 * GROWTH,
@@ -687,7 +701,7 @@ def _tables(linear: LinearModes, i: int) -> list[PageTable]:
     head = ("Shape (largest amplitude 1)", "rotor", *multiblade(linear.blades)[0])
     caption = f"Modes by the {linear.label} ({linear.source})"
     return [
-        PageTable(caption, ("Mode", *columns), frequencies),
+        PageTable(caption, ("Mode", *columns), frequencies, wide=(3, 4, 6)),
         PageTable("Mode shapes", head, shapes),
     ]
 

@@ -207,9 +207,9 @@
       const labels = ticks(low, high, plot.log ? 5 : Math.max(2, Math.floor(plot.height / 38)), plot.log);
       left = Math.max(34, 13 + LETTER * Math.max(0, ...labels.map(([, label]) => label.length)));
       // Long names that would take more than a third of the width are in the legend alone.
-      const isLong = ({ length }) => length > 4 && LETTER * length > (width - left) / 3;
+      const isLong = ({ length }) => length > 5 && LETTER * length > (width - left) / 3;
       let names = ends(to, limits);
-      if (names.some(([name]) => isLong(name))) names = names.filter(([name]) => name.length <= 4);
+      if (names.some(([name]) => isLong(name))) names = names.filter(([name]) => name.length <= 5);
       const longest = Math.max(0, ...names.map(([name]) => name.length));
       right = width - Math.max(RIGHT, longest && LETTER * longest + 8);
       sx = scale(from, to, left, right, axis.log);
