@@ -17,10 +17,11 @@ from rotor_mbs.report.elements import (
     TableCell,
 )
 from rotor_mbs.report.looks import label_of, with_capital
-from rotor_mbs.report.numbers import typeset_title
+from rotor_mbs.report.numbers import in_words, typeset_title
 from rotor_mbs.report.pages import Report, method_cell
 from rotor_mbs.studies.stability import OUTCOMES, SuiteRun, suite_table
 
+_NAMES = 3  # in a sentence
 _METHODS_IN_A_TABLE = 7  # beside the scene, on a page of 1440 px
 _WRONG = ("inaccurate", "diverged", "singular", "solver_failed")
 
@@ -95,10 +96,14 @@ def _ranking(compared: Sequence[SuiteRun], methods: Sequence[str]) -> list[Marku
     which = with_capital(" and ".join(names[:3]))
     sentences = [text.format(which, verb, best, max(counts.values()), comment)]
     # By the share: not every method has run every scene.
-    worst = min(methods, key=lambda method: good[method] / max(counts[method], 1))
+    shares = {method: good[method] / max(counts[method], 1) for method in methods}
+    worst = min(methods, key=lambda method: shares[method])
     if good[worst] < best:
+        names = [label_of(method) for method in methods if shares[method] == shares[worst]]
         text = Markup("The fewest: {}, {} of {}.")
-        sentences.append(text.format(label_of(worst), good[worst], counts[worst]))
+        which = "; ".join(names) if len(names) <= _NAMES else f"{in_words(len(names))} methods"
+        count = f"{counts[worst]} each" if len(names) > 1 else counts[worst]
+        sentences.append(text.format(which, good[worst], count))
     return sentences
 
 
