@@ -57,6 +57,7 @@ from rotor_mbs.scenario.keys import counted
 from rotor_mbs.solution.defects import FLOOR_SAFETY
 
 _REFERENCE = Look(PALETTE["reference"][0], "-", "", "reference")
+_SEEN = 0.02  # share of the range of a plot, about the width of the reference's band
 _CHANNELS_SHOWN = 8  # plots; those of further channels are folded
 
 
@@ -76,11 +77,13 @@ def comparison_page(record: Record) -> PageContent:
     marks = _marks(record, verdict, onset)
     sections = [_table_section(record, verdict), _reading_section(verdict)]
     if len(record.arrays[verdict.axis]) > 1:  # a curve needs two points
-        sections = [
+        shown = [
             _channel_section(record, verdict, marks),
             _error_section(record, verdict, marks),
-            *sections,
         ]
+        if onset is not None and not _is_seen(record, verdict):
+            shown.reverse()
+        sections = [*shown, *sections]
     rows = counted(verdict.rows, "row")
     about = f"{typeset_title(record.attributes['title'])} · {rows}"
     facts = [
@@ -183,6 +186,26 @@ def _tone(channel: ChannelErrors, verdict: DataVerdict) -> str:
         return "bad"
     is_within = channel.defect is not None and channel.defect <= verdict.tolerance
     return "good" if is_within else ""
+
+
+def _is_seen(record: Record, verdict: DataVerdict) -> bool:
+    """Return whether a channel's data leave the reference by what is seen where both are plotted.
+
+    Parameters
+    ----------
+    record : the stored comparison, with the reference and the errors of each row.
+    verdict : of it; channels within the tolerance do not count.
+    """
+    for channel in verdict.channels:
+        name = channel_key(channel.name)
+        if not _is_outside(channel, verdict) or f"{name}_error" not in record.arrays:
+            continue
+        data = np.asarray(record.arrays[name], float)
+        errors = np.abs(record.arrays[f"{name}_error"])
+        known = data[np.isfinite(data)]
+        if np.nanmax(errors, initial=0.0) > _SEEN * np.ptp(known if len(known) else np.zeros(1)):
+            return True
+    return False
 
 
 def onset_of(record: Record, verdict: DataVerdict) -> tuple[float, str] | None:
