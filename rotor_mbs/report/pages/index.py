@@ -328,7 +328,7 @@ def _departure_cells(scene: StoredScene) -> list[TableCell | str]:
         cells.append(TableCell("runs away", order=gain))
     elif created_energy(scene) is None:
         size = prefixed(gain, "J", 2) if gain >= 1.0 else "below 1 J"
-        note = f"below {ENERGY_RISE:g} of the scale" if gain >= 1.0 else ""
+        note = f"below {ENERGY_RISE:g} of the energy scale" if gain >= 1.0 else ""
         cells.append(TableCell(size, note=note, order=gain))
     else:
         cells.append(TableCell(prefixed(gain, "J"), order=gain))
@@ -346,7 +346,7 @@ def _errata_section(report: Report) -> Section:
     methods = errata_methods()
     for erratum in report.errata:
         where = TableCell(
-            f"{erratum.id}, {', '.join(erratum.stands_in)}",
+            f"{erratum.id}, {paper.equations_of(erratum)}",
             href=f"errata.html#{erratum.id}",
             note=erratum.entry,
         )

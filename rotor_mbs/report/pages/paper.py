@@ -14,6 +14,7 @@ from rotor_mbs.analysis.published import (
     UNDECIDED,
     CheckedEntry,
     ClaimStudy,
+    Erratum,
     Published,
     checked_entries,
     rounds_to,
@@ -221,17 +222,23 @@ def claims_page(report: Report) -> PageContent:
         )
         answer.append(text.format(len(study.verdicts), *(in_words(count) for count in holds)))
         words = [claim for claim in claims if not claim.is_number]
-        count = Grid(2, [[number_table(claims)], [count_table(study)]])
-        sections.append(Section("numbers", "Numbers and counts", [count]))
+        counts: list[Element] = [count_table(study), Note(study_note(study))]
         sections.append(
-            Section("claims", "Claims", [claim_table(words, study), Note(study_note(study))])
+            Section("numbers", "Numbers and counts", [Grid(2, [[number_table(claims)], counts])])
         )
+        sections.append(Section("claims", "Claims", [claim_table(words, study)]))
     elif numbers:
         sections.append(Section("numbers", "Numbers", [number_table(claims)]))
     notes = [Note(text) for text in report.conditions.values()]
     how = "What had to be found out to reproduce the numbers, since the paper does not print it."
     sections.append(Section("conditions", "Conditions", notes, how))
     return PageContent("Published numbers and claims", PAPER, answer, [], sections)
+
+
+def equations_of(erratum: Erratum) -> str:
+    """Return in which equations an erratum stands: "equations (8), (17)"."""
+    plural = "s" if len(erratum.stands_in) > 1 else ""
+    return f"equation{plural} {', '.join(erratum.stands_in)}"
 
 
 _PLACE = re.compile(r"row (\d) column (\d)")
@@ -268,7 +275,7 @@ def errata_page(report: Report) -> PageContent:
     facts = []
     for erratum in report.errata:
         effect = _effect(report, erratum.id)
-        facts.append(Fact(f"{erratum.id}: {', '.join(erratum.stands_in)}", *effect))
+        facts.append(Fact(f"{erratum.id}: {equations_of(erratum)}", *effect))
     sections = []
     say = "In matrices wrong entries are struck out and followed by the correct ones."
     for erratum in report.errata:
@@ -289,7 +296,7 @@ def errata_page(report: Report) -> PageContent:
         elements: list[Element] = [Listing(items)]
         for equation, rows in matrices(entries, erratum.stands_in):
             elements.append(Matrix(f"{equation} as printed", rows))
-        heading = f"{erratum.id}: {', '.join(erratum.stands_in)}"
+        heading = f"{erratum.id}: {equations_of(erratum)}"
         has_matrices = len(elements) > 1
         sections.append(
             Section(erratum.id, heading, [Grid(1, [elements])], say if has_matrices else "")
