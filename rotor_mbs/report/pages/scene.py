@@ -51,6 +51,7 @@ from rotor_mbs.report.numbers import (
     prefixed,
     seconds,
     span,
+    typeset,
     typeset_title,
     up_to,
     with_unit,
@@ -382,7 +383,7 @@ def _own_page(scene: StoredScene, report: Report) -> PageContent:
         energies = _energy_channel(run)
         sections.append(_motion_section(scene, run, jumps, motion, others))
         sections.append(_loads_section(run, jumps, loads, energies))
-        sections.append(_extremes_section(run, [*motion, *others, *loads]))
+        sections.append(_extremes_section(run, [*motion, *others, *_root_moments(run), *loads]))
         facts += _own_facts(scene, run)
     sections += [_agreement_section(scene, report), _details_section(scene)]
     return PageContent(
@@ -411,7 +412,14 @@ def _faults(scene: StoredScene) -> list[Markup]:
             text = Markup('<span class="bad">{}: {}</span>').format(
                 with_capital(label_of(method)), status_text(run)
             )
-        sentences.append(text + (f": {reason}." if reason else "."))
+        text += f": {typeset(reason)}." if reason else "."
+        error = metric(run, "angle_error_max")
+        if run.status == "inaccurate" and error is not None and error <= OK_ERROR:
+            # What was exceeded need not be what the reader is after: the angles.
+            text += f" Its angles are within {up_to(error)} rad of the reference"
+            compared, whole = compared_time([scene])
+            text += f" up to {seconds(compared)}." if compared < whole else "."
+        sentences.append(text)
     # Many failures are named together: the reasons are in the tables.
     if len(sentences) > 2:
         names = [
@@ -490,6 +498,17 @@ def _peak(run: StoredRun, name: str) -> tuple[float, int, float] | None:
         return None
     sample, blade = np.unravel_index(int(np.nanargmax(sizes)), sizes.shape)
     return float(sizes[sample, blade]), int(blade) + 1, float(run.array("time")[sample])
+
+
+def _root_moments(run: StoredRun) -> list[Channel]:
+    """Return the channel of the magnitudes of the blade root moments; none where a run lacks them.
+
+    The largest of them is what the page quotes; the other channels of loads are components.
+    """
+    if "blade_root_moment" not in run:
+        return []
+    sizes = np.linalg.norm(run.array("blade_root_moment"), axis=2)
+    return [_in_units("Blade root moment, magnitude", "N m", _blade_curves(sizes))]
 
 
 def _result_fact(scene: StoredScene, name: str, good: str) -> Fact:
@@ -794,6 +813,8 @@ def _loads_section(
         cards = []
         for channel in vectors:
             is_still = channel.name == "Blade root moment y"
+            # The frame stands above all of them.
+            channel = channel._replace(note="")
             cards.append([channel.plot(axis, time, marks=jumps.marks(), still=is_still)])
         elements.append(Grid(3, cards))
     last: list[list[Element]] = [
@@ -808,6 +829,11 @@ def _loads_section(
     say = "Drag over a plot to zoom all of them in time; double-click to go back."
     if jumps.times and loads:
         say += " Loads that jump with the torque or a command are interrupted there."
+    frames = dict.fromkeys(channel.note for channel in vectors)
+    if len(frames) > 1:
+        say += " Components are in the blade frame for blade loads, else in the base frame."
+    elif vectors:
+        say += f" Components are in the {vectors[0].note}."
     return Section("loads", heading, elements, say)
 
 
@@ -839,7 +865,7 @@ def _extremes_section(run: StoredRun, channels: Sequence[Channel]) -> Section:
             ]
             rows.append(row)
     head = ("Quantity", "Unit", "Smallest", "at (s)", "Largest", "at (s)", "Mean", "Std. deviation")
-    table = PageTable("Extremes", head, rows, wide=(3, 5, 7), sortable=True)
+    table = PageTable("Extremes", head, rows, wide=(3, 5, 6, 7), sortable=True)
     return Section("extremes", "Extremes", [table] if rows else [])
 
 
