@@ -69,6 +69,7 @@ PLOTS = {
     "nothing": plot("nothing", curve(np.full(101, np.nan))),
     "empty": plot("empty", curve([])),
     "short": plot("short", curve(TIME[:51])),
+    "tall numbers": plot("tall numbers", curve(1.265 + 6e-4 * TIME, beside="fourteen chars")),
     "log": plot("log", curve(np.where(TIME > 0.0, 10.0 ** (TIME - 8.0), 0.0)), log=True),
     "clip": plot("clip", curve(np.sin(TIME)), curve(-np.exp(TIME), "two", TWO), clip=(-3.0, 3.0)),
     "two clips": plot(
@@ -344,6 +345,20 @@ def test_a_run_that_ended_has_no_value_after_its_end(page: Page, written: Path) 
     assert page.run(f"{find('short')}.querySelector('output').textContent") == "–"
     point(page, "lines", 5.0)
     assert page.run(f"{find('short')}.querySelector('output').textContent") == "5"
+
+
+def test_ticks_have_equal_decimals_and_long_names_leave_the_plot_its_width(
+    page: Page, written: Path
+) -> None:
+    opened(page, written)
+    assert labels(page, "tall numbers")[:3] == ["1.266", "1.268", "1.270"]
+    beside = f"{find('tall numbers')}.querySelector('svg').clientWidth"
+    name = 7.3 * len("fourteen chars")
+    # Beside the frame where it takes less than a third of the width, else within it.
+    for width, is_beside in ((1440, True), (390, False)):
+        opened(page, written, width)
+        room = page.run(beside) - box_of(page, "tall numbers")["right"]
+        assert (room >= name) == is_beside
 
 
 def test_zero_is_a_gap_on_a_logarithmic_axis(page: Page, written: Path) -> None:

@@ -4,6 +4,7 @@ text."""
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -194,6 +195,17 @@ def test_a_still_picture_has_the_curves_the_range_and_the_colours_of_the_page() 
     assert " id=" not in text
     ticks = [float(tick.replace("−", "-")) for tick in re.findall(r">([−\d.]+)</text>", text)]
     assert max(tick for tick in ticks if tick not in (4.0, 6.0, 8.0, 10.0)) <= 2.0  # not exp(10)
+
+
+def test_ticks_of_an_axis_have_equal_decimals() -> None:
+    axis = Horizontal("time", "s", "t", 0.0, 10.0)
+    curve = Curve("one", coordinate_look(1, "first"), TIME, 1.2672 + 4e-4 * TIME)
+    text = str(still(Plot("speed", "rad/s", axis, [curve], still=True)))
+    ticks = [tick for tick in re.findall(r">([−\d.]+)</text>", text) if tick.startswith("1.2")]
+    assert ticks[:2] == ["1.268", "1.270"]
+    below = str(still(replace(Plot("x", "", axis, [replace(curve, y=TIME - 0.9)]), height=300)))
+    assert ">0<" in below
+    assert ">0.0<" not in below
 
 
 def test_extremes_of_intervals_are_drawn_and_gaps_are_left_out() -> None:

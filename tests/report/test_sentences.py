@@ -24,7 +24,7 @@ from rotor_mbs.report.files import write_page
 from rotor_mbs.report.numbers import number
 from rotor_mbs.report.pages import agreement_of_scenes, computations
 from rotor_mbs.report.pages.comparison import comparison_page, error_panels, onset_of
-from rotor_mbs.report.pages.modes import modes_page
+from rotor_mbs.report.pages.modes import mode_answer, modes_page
 from rotor_mbs.runs.read import Record, open_results
 from rotor_mbs.scenario.scene import scene_toml
 from rotor_mbs.studies.modes import compute_modes
@@ -215,6 +215,10 @@ def test_the_largest_root_moment_is_that_of_the_file(tmp_path: Path) -> None:
         rf"largest blade root moment is NUMBER kN m, blade {blade + 1} at NUMBER s", answer_of(text)
     )
     assert (moment * 1e3, at) == pytest.approx((sizes.max(), time), rel=5e-3)
+    # The table has what is quoted, among all magnitudes.
+    row = rows_of(section_of(text, "extremes"))[f"Blade root moment, magnitude, blade {blade + 1}"]
+    assert (row[0], value(row[3]) * 1e3) == ("kN m", pytest.approx(sizes.max(), rel=1e-3))
+    assert float(row[4]) == pytest.approx(time, abs=0.0051)
     assert facts_of(text)["Largest root moment"].startswith(
         f"{number(sizes.max() / 1e3, 3)} kN m | blade {blade + 1}"
     )
@@ -273,6 +277,12 @@ def test_a_comparison_names_the_onset_of_a_fault_and_crosses_only_what_differs(
     text = text_of(compared.to_html(tmp_path / "out").parent)
     assert "The data differ from paper/fig03 from 4 s on" in answer_of(text)
     assert facts_of(text)["First outside the tolerance"].startswith("4 s")
+    # 0.02 rad are seen beside a motion of half a radian: the data stand before their errors.
+    assert text.index("Data and reference") < text.index("<h2>Errors")
+    angles[time > 4.0, 0] -= 0.0199
+    hidden = compare({"time": time, "angles": angles, "rates": rates}, scene)
+    small = text_of(hidden.to_html(tmp_path / "small").parent)
+    assert small.index("<h2>Errors") < small.index("Data and reference")
     rows = rows_of(section_of(text, "table"))
     assert rows["rotor"][1].startswith("✗")
     assert rows["pitch 1"][1].startswith("✓")
@@ -390,7 +400,8 @@ def test_the_sentence_of_modes_has_their_frequencies_and_stability() -> None:
     ]  # type: ignore[index]
     assert numbers[0] == pytest.approx(known.min(), rel=1e-3)
     assert numbers[-1] == pytest.approx(known.max(), rel=1e-3)
-    assert "agree within" in text
+    assert str(page.answer[0]).startswith("paper/fig11, changed: bearing.stiffness: at rest its")
+    assert str(page.answer[-1]).startswith("The modes of four models agree within")
     assert ("stable at all" in text) == bool(
         (modes.floquet is not None) and (modes.floquet.stable == 1).all()
     )
@@ -416,8 +427,11 @@ def test_facts_of_modes_have_the_digits_of_the_sentence_and_say_of_which_modes_t
     monkeypatch.setattr(SceneModes, "faults", property(lambda _: []))
     monkeypatch.setattr(SceneModes, "disagreement", 4.51e-13)
     bearing = {"stiffness": 1e4, "damping": 10.0}
-    page = modes_page([compute_modes(paper("fig11").replace(bearing=bearing), [0.5, 1.0])])
+    apart = compute_modes(paper("fig11").replace(bearing=bearing), [0.5, 1.0])
+    page = modes_page([apart])
     facts = {fact.name: fact for fact in page.facts}
+    monkeypatch.setattr(SceneModes, "disagreement", 0.5)
+    assert "do not agree" in str(mode_answer(apart)[0])
     assert "agree within <b>4.6×10⁻¹³</b>" in str(page.answer[-1])
     assert facts["Models"].note == "4; difference 4.6×10⁻¹³ of the largest eigenvalue"
     assert facts["Damping ratio"].note == "in rotation without gravity, over all speeds"

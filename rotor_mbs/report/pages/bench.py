@@ -103,9 +103,11 @@ def bench_page(results: OpenResults) -> PageContent:
     whole = sum(len(curve.statuses) for curves in scenes.values() for curve in curves)
     for name, curves in scenes.items():
         count = sum(len(curve.statuses) for curve in curves)
-        points = point_table(curves, only_faults=whole > _MAX_POINTS)
+        is_cut = whole > _MAX_POINTS
+        points = point_table(curves, only_faults=is_cut)
+        shown_rows = f"{len(points.rows)} of " if is_cut else ""
         shown = [points] if len(scenes) == 1 else [_reach_table(curves), points]
-        folds.append(Fold(name, f"{count} settings", shown))
+        folds.append(Fold(name, f"{shown_rows}{count} settings", shown))
     say = "Those that are not ok; all are in the file." if whole > _MAX_POINTS else ""
     sections.append(Section("points", "Every setting", folds, say))
     return PageContent(

@@ -325,7 +325,7 @@ def mode_answer(scene: SceneModes) -> list[Markup]:
     if not sentences:
         return faults
     first = Markup("{}: {}").format(scene.label, sentences[0])
-    return [*faults, first, *map(with_capital, sentences[1:])]
+    return [*faults, first, *(Markup(with_capital(text)) for text in sentences[1:])]
 
 
 def _difference(scene: SceneModes) -> str:
