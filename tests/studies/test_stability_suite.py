@@ -11,6 +11,7 @@ import pytest
 from support.commands import rotor_mbs
 
 from rotor_mbs.report.build import write_report
+from rotor_mbs.report.pages.stability import ranking
 from rotor_mbs.runs.read import read_records
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.solution.status import STATUSES
@@ -110,6 +111,16 @@ def test_runs_are_counted_by_folder() -> None:
     assert table.rows == [("a", "1+1 of 2", "0 of 1", "1"), ("b", "1 of 1", "", "0"), printed]
     # the map shows whatever a stored run can have
     assert {*STATUSES} - {"left_out", "worker_died"} <= {*OUTCOMES}
+
+
+def test_all_methods_that_are_ok_on_the_fewest_scenes_are_named() -> None:
+    methods = ["lagrange/taylor", "exudyn_tree/rk67", "mujoco/rk4"]
+    outcomes = ("ok", "smaller_step", "diverged")
+    runs = [made_run(*run) for run in zip(methods, outcomes, strict=True)]
+    _, fewest = map(str, ranking(runs, methods))
+    assert fewest == "The fewest: Exudyn tree, RK67; MuJoCo, RK4, 0 of 1 each."
+    _, fewest = map(str, ranking([*runs, made_run("mujoco/rk4", "ok", "stiff/b")], methods))
+    assert fewest == "The fewest: Exudyn tree, RK67, 0 of 1."
 
 
 @pytest.mark.full

@@ -68,13 +68,13 @@ def stability_page(report: Report) -> PageContent:
     return PageContent(
         "Stiff and extreme scenes: range of each method",
         report.path.name,
-        [*_ranking(compared, methods), _false_successes(runs)],
+        [*ranking(compared, methods), _false_successes(runs)],
         facts,
         sections,
     )
 
 
-def _ranking(compared: Sequence[SuiteRun], methods: Sequence[str]) -> list[Markup]:
+def ranking(compared: Sequence[SuiteRun], methods: Sequence[str]) -> list[Markup]:
     """Return a sentence on the methods that are ok on most scenes, and one on those of the fewest.
 
     Parameters
