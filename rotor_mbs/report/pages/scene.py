@@ -711,7 +711,6 @@ def _torque_plot(scene: Scene, run: StoredRun, jumps: Jumps) -> Plot | None:
         draw.time_axis(time),
         [curve],
         150,
-        "the scene's table",
         marks=jumps.marks(),
     )
 
