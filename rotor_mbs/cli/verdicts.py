@@ -58,9 +58,8 @@ def check(arguments: argparse.Namespace) -> int:
         raise InputError("--allow-changed: allowed: with --against OLD")
     if arguments.require and arguments.file is None:
         raise InputError("--require: allowed: with a FILE that is to have the runs")
-    bounds = shipped_bounds().with_entries(
-        read_bounds(arguments.bounds) if arguments.bounds else ()
-    )
+    own_bounds = read_bounds(arguments.bounds) if arguments.bounds else ()
+    bounds = shipped_bounds().with_entries(own_bounds)
     earlier = None if arguments.against is None else study.check_file(arguments.against, bounds)
     if (
         earlier is not None
@@ -76,6 +75,13 @@ def check(arguments: argparse.Namespace) -> int:
         with ProgressLine() as progress:
             verdicts = study.check_default_set(bounds, arguments.jobs, progress, arguments.method)
     scenes = study.scenes_checked(arguments.file)
+    for bound in study.unused_bounds(own_bounds, verdicts, scenes):
+        told = f"{bound.check!r}, method {bound.method!r}, scenes {bound.scenes!r}"
+        limit = "; scenes: of shipped scenes, unchanged" if bound.scenes != "*" else ""
+        print(
+            f"warning: {escaped(str(arguments.bounds))}: no check fits the bound of {told}{limit}",
+            file=sys.stderr,
+        )
     if verdicts and earlier is not None:
         before = study.scenes_checked(arguments.against)
         changes = study.changed_scenes(scenes, before, are_allowed=arguments.allow_changed)

@@ -34,8 +34,8 @@ from rotor_mbs.runs.read import is_sweep, open_results
 from rotor_mbs.runs.runner import OnProgress, ignore_progress
 from rotor_mbs.runs.sweeps import StoredSweep, parameter_name
 from rotor_mbs.runs.table import TableFile
-from rotor_mbs.scenario.accuracy_bounds import Bounds
-from rotor_mbs.scenario.catalogue import find_scenes, natural_key
+from rotor_mbs.scenario.accuracy_bounds import Bound, Bounds
+from rotor_mbs.scenario.catalogue import changes_from_shipped, find_scenes, natural_key
 from rotor_mbs.scenario.scene import Scene, scene_changes
 from rotor_mbs.studies.run import run_scenes
 from rotor_mbs.studies.stored_references import shipped_reference
@@ -278,6 +278,33 @@ def changed_scenes(
             )
         )
     return sorted(checks, key=lambda check: natural_key(check.where.scene))
+
+
+def unused_bounds(
+    entries: Iterable[Bound], checks: Sequence[Check], scenes: Mapping[str, Scene]
+) -> list[Bound]:
+    """Return the entries that fit no check: a misspelt method or scene would pass unnoticed.
+
+    Parameters
+    ----------
+    entries : of a user's own file of bounds.
+    checks : those that were made.
+    scenes : that were checked, by name.
+    """
+    # Patterns of scenes are compared as `checks_of` does: with the names of shipped scenes alone.
+    shipped = {name for name, scene in scenes.items() if changes_from_shipped(scene) == []}
+    unused = []
+    for entry in entries:
+        fitting = (
+            check
+            for check in checks
+            if Bounds([entry], check.where.scene if check.where.scene in shipped else "").find(
+                check.name, check.where.method
+            )
+        )
+        if next(fitting, None) is None:
+            unused.append(entry)
+    return unused
 
 
 def judged_runs(checks: Iterable[Check]) -> Counter[str]:

@@ -406,6 +406,21 @@ def test_a_users_bound_goes_before_the_shipped_one(good: Path, tmp_path: Path) -
     assert all("exudyn_tree" in line and "bound 0.00e+00" in line for line in lines[:-2])
 
 
+def test_a_users_bound_that_fits_no_check_is_named(good: Path, tmp_path: Path) -> None:
+    """A misspelt method would else leave a check of CI without its bound."""
+    own = tmp_path / "own.toml"
+    entry = '[[bound]]\ncheck = "{}"\nmethod = "{}"\nvalue = 1\nreason = "ours"\n'
+    fits = entry.format("error", "exudyn_*") + f'scenes = "{SCENE}"\n'
+    own.write_text(fits + entry.format("error", "exudyn_tree/rk68"))
+    ended = rotor_mbs("check", good, "--bounds", own)
+    assert ended.status == 0
+    (warning,) = ended.err.splitlines()
+    assert "own.toml: no check fits the bound of 'error', method 'exudyn_tree/rk68'" in warning
+    own.write_text(entry.format("error", "exudyn_*") + 'scenes = "mine"\n')
+    (warning,) = rotor_mbs("check", good, "--bounds", own).err.splitlines()
+    assert warning.endswith("scenes 'mine'; scenes: of shipped scenes, unchanged")
+
+
 # Stored numbers
 
 
