@@ -228,9 +228,10 @@ def caption_of(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> str:
             "rotor."
         ),
     }[figure.kind]
-    lines = [f"{title_of(figure, scenes)}.", what]
+    title = title_of(figure, scenes) if figure.number else _name(scenes[figure.panels[0][1]])
+    lines = [f"{title}.", what]
     for label, name in figure.panels:
-        lines.append(_scene_line(label, scenes[name]))
+        lines.append(_scene_line(label, scenes[name], has_title=bool(figure.number)))
     sides: dict[str, list[StoredRun]] = {}
     for row in pictures.values():
         for key, runs in row.items():
@@ -280,16 +281,37 @@ def caption_of(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _scene_line(label: str, scene: StoredScene) -> str:
-    """Return a line about a scene: its title, start, gravity, duration and samples."""
+def _name(scene: StoredScene) -> str:
+    """Return the title and the name of a scene, as a caption has them."""
+    return f"{scene.title} (scene {scene.label})"
+
+
+def _scene_line(label: str, scene: StoredScene, *, has_title: bool) -> str:
+    """Return a line about a scene: start, masses, gravity, duration and samples.
+
+    Parameters
+    ----------
+    label : of its panel, "" for the only one.
+    scene : the scene.
+    has_title : whether the line begins with title and name; the caption of another figure than the
+        paper's begins with them.
+    """
     initial = scene_tables(scene.scene)["initial"]
     angles, rates = (
         ", ".join(f"{value:.6g}" for value in initial[key]) for key in ("angles", "rates")
     )
+    masses = [f"{blade.mass:.6g}" for blade in scene.scene.blades]
+    if len(masses) == 1:
+        blades = f"blade of {masses[0]} kg"
+    elif len(set(masses)) == 1:
+        blades = f"blades each of {masses[0]} kg"
+    else:
+        blades = f"blades of {', '.join(masses)} kg"
     before = f"({label}) " if label else ""
+    start = f"{_name(scene)}: initial" if has_title else "Initial"
     return (
-        f"{before}{scene.title} (scene {scene.label}): initial angles {angles} rad and rates "
-        f"{rates} rad/s, rotor first; gravity {scene.scene.gravity:g} m/s^2; "
+        f"{before}{start} angles {angles} rad and rates {rates} rad/s, rotor first; "
+        f"{blades}; gravity {scene.scene.gravity:g} m/s^2; "
         f"{scene.scene.duration:g} s, {scene.scene.samples} samples."
     )
 

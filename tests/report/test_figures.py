@@ -156,12 +156,24 @@ def test_the_caption_has_scene_methods_settings_and_what_is_right(drawn: Path) -
     for piece in (
         "Figure 11 of", "scene paper/fig11", ("initial angles 0.523599, 0.785398, 0.523599, "
                                              "1.5708 rad"),
-        "gravity 9.8 m/s^2; 10 s, 1001 samples", "with their 3 errors; wrong", "(printed/ode45)",
+        "blades each of 15000 kg; gravity 9.8 m/s^2; 10 s, 1001 samples", "with their 3 errors; wrong", "(printed/ode45)",
         "Corrected model: right", "(reference)", ("of an independent computation from the "
                                                  "corrected model"),
         "(exudyn_tree/rk67)", "It is right; no angle differs by more than 0 rad.",
     ):  # fmt: skip
         assert piece in text, piece
+
+
+def test_the_caption_of_an_own_scene_has_its_title_once_and_its_masses(tmp_path: Path) -> None:
+    scene = paper("fig11", samples=101).replace(**{"blade.mass": 2e4})
+    scene = replace(scene, name="heavy", title="Heavy")
+    runs = [Made(scene, "lagrange/taylor", rotor(np.sin))]
+    with open_results(store(tmp_path / "r.h5", runs)) as opened:
+        text = caption_of(all_figures(opened.scenes)["heavy"], opened.scenes)
+    assert text.startswith("Heavy (scene heavy).\n")
+    assert text.count("Heavy") == 1
+    assert "\nInitial angles 0.523599, " in text
+    assert "blades each of 20000 kg; gravity 9.8" in text
 
 
 def test_a_caption_calls_nothing_right_that_is_not_ok(tmp_path: Path) -> None:
