@@ -137,6 +137,10 @@ def test_the_action_fails_on_a_loosened_run_and_leaves_its_files(
     assert "::error title=rotor-mbs against" in done[-1].stdout
     output = folder / "rotor-mbs-check"
     assert {path.name for path in output.iterdir()} == {"verdicts.json", "junit.xml", "check.txt"}
+    summary = (folder / "summary.md").read_text().splitlines()
+    failed = [text for text in summary if text.startswith("FAIL ")]
+    assert f"{len(failed)} failed" in summary[-2]  # those of annotations, too
+    assert "::error" not in "".join(summary)
     for case in ElementTree.parse(output / "junit.xml").iter("testcase"):
         properties = {item.attrib["name"]: item.attrib["value"] for item in case.iter("property")}
         assert set(properties) == {"value", "bound", "margin", "unit"}
