@@ -6,6 +6,7 @@ Checks are written as lines of text, JSON, JUnit XML and annotations of GitHub.
 from __future__ import annotations
 
 import argparse
+import functools
 import json
 import math
 import sys
@@ -174,9 +175,11 @@ def test_method(arguments: argparse.Namespace) -> int:
     from rotor_mbs.studies.method_test import examine  # late: `check` needs no models
 
     _refuse_foreign(arguments)
-    verdicts = [
-        verdict for name in arguments.methods for verdict in examine(name, arguments.timeout)
-    ]
+    verdicts: list[Check] = []
+    with ProgressLine() as progress:
+        for name in arguments.methods:
+            show = functools.partial(progress.stage, f"{name}: scenes and other checks")
+            verdicts += examine(name, arguments.timeout, show)
     _write_verdicts(arguments, verdicts)
     if arguments.json != Path("-"):
         rows: list[tuple[str, ...]] = []

@@ -10,7 +10,7 @@ any other more than ten times as much.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -157,13 +157,17 @@ def _run(task: tuple[str, Scene, Mapping[str, object], int, float]) -> Solution:
 
 
 @caller_signals()
-def examine(name: str, timeout_s: float = 60.0) -> list[Check]:
+def examine(
+    name: str, timeout_s: float = 60.0, on_part: Callable[[int, int], None] | None = None
+) -> list[Check]:
     """Return the checks of a method, each with the most likely reason where it fails.
 
     Parameters
     ----------
     name : name of the method.
     timeout_s : time limit of a run in s.
+    on_part : called with the number of parts that are done, and of all, before the first part and
+        after each: the search for the cause of a wrong motion may take minutes.
 
     Raises
     ------
@@ -171,7 +175,11 @@ def examine(name: str, timeout_s: float = 60.0) -> list[Check]:
         If the method is unknown.
     """
     with WorkerPool(1) as pool:
-        return _Examination(find_method(name), pool, timeout_s).checks()
+        return _Examination(find_method(name), pool, timeout_s).checks(on_part or _ignore)
+
+
+def _ignore(done: int, total: int) -> None:
+    """Show no progress."""
 
 
 class _Examination:
@@ -192,10 +200,14 @@ class _Examination:
         # Whether the first scene that fails by its defects has faults at a time; None until then.
         self._has_faults_in_time: bool | None = None
 
-    def checks(self) -> list[Check]:
+    def checks(self, on_part: Callable[[int, int], None]) -> list[Check]:
         """Make all runs, and return the checks in the order in which they are made.
 
         A first short run is not judged: in it an engine may compile its code.
+
+        Parameters
+        ----------
+        on_part : see `examine`; a part is a scene, and the last one the other checks.
         """
         self._ask(
             replace(only_scene(_SMOOTH), duration=0.02, samples=2, outputs=("angles", "rates")),
@@ -212,8 +224,11 @@ class _Examination:
                     allowance,
                 )
             )
-        for scene, allowance in scenes:
+        parts = len(scenes) + 1
+        for done, (scene, allowance) in enumerate(scenes):
+            on_part(done, parts)
             self._scene(scene, allowance)
+        on_part(len(scenes), parts)
         able = [scene.name for scene, _ in scenes if scene.name not in self._refused]
         hint, reasons = "rejects every scene", set(self._refused.values())
         if len(reasons) == 1:  # as that its engine is not installed
@@ -230,6 +245,7 @@ class _Examination:
             self._symmetries(scene)
             self._order(scene)
             self._stops(scene)
+        on_part(parts, parts)
         return self._made
 
     def _add(

@@ -219,6 +219,7 @@ def test_the_command_prints_a_table_and_writes_what_a_script_reads() -> None:
     ended = rotor_mbs("test-method", method, "--json", "t.json", "--junit", "t.xml")
     assert ended.status == 0, ended
     assert f"{method}  determinism   paper/fig11" in ended.out
+    assert f"{method}: scenes and other checks 0/7\n" in ended.err  # a search may take minutes
     checks = json.loads(Path("t.json").read_text())
     assert {check["check"] for check in checks} == {
         "samples", "times", "start", "defect", "energy", "tip", "energies", "loads", "determinism",
