@@ -87,8 +87,12 @@ def check(arguments: argparse.Namespace) -> int:
         before = study.scenes_checked(arguments.against)
         changes = study.changed_scenes(scenes, before, are_allowed=arguments.allow_changed)
         changed = {change.where.scene for change in changes if change.value}
-        verdicts += [*study.regressions(verdicts, earlier, changed), *changes]
-        if arguments.file is not None and is_sweep(arguments.file):
+        has_sweep = is_sweep(arguments.against)
+        settings = {}
+        if arguments.file is not None and not has_sweep:
+            settings = study.changed_settings(arguments.file, arguments.against)
+        verdicts += [*study.regressions(verdicts, earlier, changed, settings), *changes]
+        if arguments.file is not None and has_sweep:
             verdicts.append(study.runs_gone(arguments.file, arguments.against))
 
     _write_verdicts(arguments, verdicts)

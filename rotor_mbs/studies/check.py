@@ -7,7 +7,7 @@ import math
 import tempfile
 from collections import Counter
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from rotor_mbs.analysis.checks import Check, Where, checks_of
 from rotor_mbs.analysis.run_checks import bounded
-from rotor_mbs.errors import InputError
+from rotor_mbs.errors import InputError, StoreError
 from rotor_mbs.methods.catalogue import (
     REFERENCE,
     check_names,
@@ -319,8 +319,45 @@ def judged_runs(checks: Iterable[Check]) -> Counter[str]:
     )
 
 
+def changed_settings(new: Path, old: Path) -> dict[tuple[str, str], str]:
+    """Compare the settings of the runs that two results files have both.
+
+    Parameters
+    ----------
+    new, old : results files; damaged settings are left to the check of them.
+
+    Returns
+    -------
+    dict
+        From scene and method to "step 0.0005 -> 0.02", where the settings differ.
+    """
+    found: list[dict[tuple[str, str], dict[str, Any]]] = []
+    for path in (new, old):
+        settings = {}
+        with open_results(path, verify=False) as results:
+            for name, scene in results.scenes.items():
+                for method, run in scene.runs.items():
+                    with suppress(StoreError):
+                        settings[name, method] = run.settings
+        found.append(settings)
+    now, before = found
+    told = {}
+    for key in now.keys() & before.keys():
+        words = [
+            f"{name} {before[key].get(name)} -> {now[key].get(name)}"
+            for name in sorted(now[key].keys() | before[key].keys())
+            if now[key].get(name) != before[key].get(name)
+        ]
+        if words:
+            told[key] = ", ".join(words)
+    return told
+
+
 def regressions(
-    new: Sequence[Check], old: Sequence[Check], changed: Collection[str] = ()
+    new: Sequence[Check],
+    old: Sequence[Check],
+    changed: Collection[str] = (),
+    settings: Mapping[tuple[str, str], str] | None = None,
 ) -> list[Check]:
     """Return a check for each earlier one: by what factor its margin has shrunk.
 
@@ -333,6 +370,8 @@ def regressions(
     new, old : checks of this file and of the earlier one.
     changed : names of scenes that differ: an error of one scene says nothing of that of another,
         so only the presence of their runs is checked.
+    settings : what differs between the settings of two runs, by scene and method; it is told where
+        a margin shrank.
     """
     present = {(check.name, check.where): check for check in new}
     runs = {check.where[:2] for check in new}
@@ -359,8 +398,11 @@ def regressions(
                 value = 0.0
             hint = (
                 f"margin shrank {value:,.0f}-fold (limit {_SHRINK:g}): {check.value:.2e} before, "
-                f"{now.value:.2e} now, bound {now.bound:.2e} {now.unit}; {now.hint}"
+                f"{now.value:.2e} now, bound {now.bound:.2e} {now.unit}; "
             )
+            other = (settings or {}).get((check.where.scene, check.where.method))
+            # What a person set comes before the causes that a defect may have.
+            hint += f"settings changed: {other}; {now.hint}" if other else now.hint
         where = check.where._replace(channel=f"{check.name}: {check.where.channel}")
         changes.append(Check(AGAINST, where, value, _SHRINK, hint, "fold"))
     return changes

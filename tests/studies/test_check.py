@@ -289,6 +289,19 @@ def test_of_a_changed_scene_only_missing_runs_are_regressions() -> None:
     assert (lost.passed, lost.where.channel) == (False, "run: all")
 
 
+def test_a_margin_that_shrank_with_a_setting_names_the_setting(tmp_path: Path) -> None:
+    scene = shipped("check/general").replace(duration=0.1, samples=11, outputs=["angles", "rates"])
+    files = []
+    for tolerance in (3e-14, 1e-10):
+        runs = rm.run(scene, [METHOD], relative_tolerance=tolerance)
+        files.append(runs.save(tmp_path / f"{tolerance}.h5"))
+    old, new = files
+    lines = lines_of(new, "--against", old, status=1)
+    line = named(lines, "FAIL against", METHOD, "defect: largest")
+    assert "; settings changed: relative_tolerance 3e-14 -> 1e-10; up to t = " in line
+    assert "settings changed" not in "".join(lines_of(old, "--against", old, "-v", status=0))
+
+
 def test_a_sweep_of_a_changed_scene_fails_against_an_earlier_one(tmp_path: Path) -> None:
     scene = paper("fig11", samples=11, duration=0.1)
     files = []
