@@ -57,6 +57,7 @@ if _is_imported_here and os.environ.get("MPLBACKEND"):  # for other drawings of 
 WIDTH = 5.2  # in; on a telephone's 360 px a text of 9.5 points is then 9 px high
 TIME_AXIS, SPEED_AXIS, RPM_AXIS = "time (s)", "rotor speed (rad/s)", "rotor speed (rpm)"
 PRINT_WIDTH = 174.0 / 25.4  # in; two columns of a journal
+_LEGEND_COLUMNS = 2
 MARK = b"rotor_mbs pictures"  # in the metadata of every picture that is a file
 KINDS = ("pdf", "svg", "png")
 _PAGE_STYLE, _PRINT_STYLE = (  # without matplotlib's defaults
@@ -94,11 +95,14 @@ class Panels:
                 artists,
                 loc="lower left",
                 bbox_to_anchor=(0.0, 1.0),
-                ncols=2,
+                ncols=_LEGEND_COLUMNS,
                 frameon=False,
                 fontsize=8.0,
             )
-        self.figure.subplots_adjust(top=0.95 - 0.07 * math.ceil(len(artists) / 2))
+        rows = math.ceil(len(artists) / _LEGEND_COLUMNS)
+        height = float(self.figure.get_figheight())
+        # The legend's height is the same in every figure; of a high one a fraction would be empty.
+        self.figure.subplots_adjust(top=1.0 - (0.2 + 0.19 * rows) / height)
         return self
 
     def save(self, path: str | PathLike[str]) -> None:

@@ -5,10 +5,11 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
-from itertools import combinations
+from itertools import combinations, pairwise
 
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from support.stored import rotor
 
 from rotor_mbs.methods.catalogue import ladders, method_names
@@ -43,6 +44,29 @@ def test_motion_gives_rotor_and_pitches_axes_of_their_own() -> None:
         assert mark.get_xdata() == [6.0, 6.0]
     assert len(figures.motion(TIME, SWING(TIME), None).axes) == 2
     assert len(figures.motion(TIME, SWING(TIME)[:, :1], None).axes) == 1
+
+
+def test_labels_of_axes_and_legend_do_not_overlap() -> None:
+    """As wide as on a page: the labels of the four panels, one below the other, and the legend."""
+    picture = figures.motion(TIME, SWING(TIME), SWING(TIME)).with_legend()
+    renderer = FigureCanvasAgg(picture.figure).get_renderer()
+    picture.figure.draw(renderer)
+    extents = [axes.yaxis.label.get_window_extent(renderer) for axes in picture.axes]
+    for upper, lower in pairwise(extents):
+        assert lower.y1 < upper.y0
+    legend = picture.axes[0].get_legend().get_window_extent(renderer)
+    assert legend.y0 >= picture.axes[0].get_window_extent(renderer).y1
+    assert legend.y1 <= picture.figure.bbox.y1
+
+
+@pytest.mark.parametrize("count", [1, 4, 13])
+def test_a_legend_is_inside_its_figure(count: int) -> None:
+    series = [Series(TIME, TIME, Look("k", "-", "", f"method {i}")) for i in range(count)]
+    picture = figures.lines([("rotor angle (rad)", series)]).with_legend()
+    renderer = FigureCanvasAgg(picture.figure).get_renderer()
+    picture.figure.draw(renderer)
+    legend = picture.axes[0].get_legend().get_window_extent(renderer)
+    assert 0.0 <= picture.figure.bbox.y1 - legend.y1 < 40.0
 
 
 def test_thinning_loses_no_peak_and_no_sample_of_an_ordinary_run() -> None:
