@@ -12,6 +12,7 @@ import types
 from collections.abc import Callable, Collection
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 from support.commands import refusal, rotor_mbs
@@ -129,6 +130,48 @@ def test_show_tells_what_is_in_a_file_and_what_to_do_next(
     assert facts["kind"] == parts[0]
     assert facts["bytes"] == files[name].stat().st_size
     assert facts["made_with"]["rotor_mbs"] == rm.__version__
+
+
+def test_show_as_json_has_the_rows_of_a_file_in_its_order(tmp_path: Path) -> None:
+    """For programs that read no texts of HDF5; a row that is not computed yet counts, too."""
+    curve = rotor(np.sin, np.cos, np.sin, np.cos)
+    made = [
+        Made(paper(name, samples=3), method, curve)
+        for name in ("fig11", "fig12")
+        for method in ("exudyn_tree/rk67", METHOD, "printed/ode45")
+        if (name, method) != ("fig11", METHOD)
+    ]
+    path = store(tmp_path / "r.h5", made)
+    table.TableFile(path).place("paper/fig12/printed/ode45").mark_missing([0])
+    with h5py.File(path) as file:
+        rows = file["runs/run"].asstr()[:].tolist()
+        scenes = {}
+        for name in ("paper/fig11", "paper/fig12"):
+            scenes[name] = file[name]["run"].asstr()[:].tolist()
+    shown = json.loads(rotor_mbs("show", path, "--json").out)["runs"]
+    assert shown == rows
+    assert len(shown) == 5
+    for name, methods in scenes.items():
+        assert [row for row in shown if row.startswith(f"{name}/")] == [
+            f"{name}/{method}" for method in methods
+        ]
+
+
+def test_a_run_of_a_sweep_does_not_say_up_to_when_it_was_compared(
+    files: dict[str, Path],
+) -> None:
+    """Its predicted error has a limit; it has no horizon, and nothing follows the last word."""
+    run = rm.open(files["sweep"])[0]
+    (line,) = [line for line in repr(run).splitlines() if "angle error" in line]
+    assert line.endswith("predicted, limit 0.01")
+    assert "compared to" not in run._repr_html_()
+
+
+def test_the_headline_of_runs_does_not_read_as_a_value_of_what_was_changed(
+    scene: rm.Scene,
+) -> None:
+    headline = repr(rm.run(scene, [METHOD])).splitlines()[0]
+    assert headline == "paper/fig08, changed: duration; 2 runs: 2 ok"
 
 
 def test_show_of_runs_that_are_not_ok_has_their_reasons(tmp_path: Path) -> None:
@@ -439,7 +482,7 @@ def test_a_changed_scene_says_so_wherever_its_name_stands(tmp_path: Path) -> Non
     other = Made(paper("fig11", samples=3), METHOD, curve)
     one = rm.open(store(tmp_path / "one.h5", [Made(scene, METHOD, curve)]))
     two = rm.open(store(tmp_path / "two.h5", [Made(scene, METHOD, curve), other]))
-    assert repr(one).startswith(f"{label}: ")
+    assert repr(one).startswith(f"{label}; 1 run: ")
     assert repr(one[METHOD]).startswith(f"{label}: ")
     assert label in repr(two)
     sweep = tmp_path / "sweep.h5"

@@ -36,6 +36,8 @@ class FileSummary:
     attributes : of the file: versions of the programs that made it, the machine, and when.
     scenes, methods, outputs : names, in the order of the file.
     labels : by scene name, with what was changed in a shipped scene.
+    runs : labels of all rows of a results file, in the order of the file, with those that are not
+        computed yet.
     statuses : number of runs, or comparisons, with each status.
     lines, tables : further text for a file of its kind.
     next : commands and calls, each with what it does.
@@ -47,6 +49,7 @@ class FileSummary:
     scenes: list[str] = field(default_factory=list)
     methods: list[str] = field(default_factory=list)
     outputs: list[str] = field(default_factory=list)
+    runs: list[str] = field(default_factory=list)
     statuses: dict[str, int] = field(default_factory=dict)
     labels: dict[str, str] = field(default_factory=dict)
     lines: list[str] = field(default_factory=list)
@@ -62,6 +65,7 @@ class FileSummary:
             "scenes": self.scenes,
             "methods": self.methods,
             "outputs": self.outputs,
+            "runs": self.runs,
             "statuses": self.statuses,
             "made_with": dict(made_with(self.attributes)),
             "next": [command for command, _ in self.next],
@@ -133,6 +137,7 @@ def _results(path: Path) -> FileSummary:
     curves, ladders = read_records(path, "bench"), read_records(path, "stability")
     with open_results(path) as results:
         summary = FileSummary(path, RESULTS, results.attributes, list(results.scenes))
+        summary.runs = results.rows
         summary.labels = {name: scene.label for name, scene in results.scenes.items()}
         runs = [run for scene in results.scenes.values() for run in scene.methods.values()]
         summary.methods = list(

@@ -390,7 +390,9 @@ class Results(Mapping[Any, Any]):
         counts = ", ".join(f"{count} {status}" for status, count in self.statuses.items())
         # a temporary file's path says nothing
         place = self._stored.title if self.scene or self._folder is not None else self.path
-        return f"{place}: {counted(len(self), 'run')}: {counts}"
+        # "changed: duration: 5 runs" would read as a duration of 5
+        separator = "; " if ": " in str(place) else ": "
+        return f"{place}{separator}{counted(len(self), 'run')}: {counts}"
 
     def _short_table(self) -> TextTable:
         """Return a table for a screen.

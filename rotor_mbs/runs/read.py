@@ -430,11 +430,13 @@ class OpenResults:
     path : of the file.
     attributes : versions, platform, created.
     scenes : by name, in natural order.
+    rows : labels of all rows of `/runs`, in the order of the file, computed or not.
     """
 
     path: Path
     attributes: dict[str, Any]
     scenes: dict[str, StoredScene]
+    rows: list[str]
 
 
 @contextmanager
@@ -467,7 +469,10 @@ def open_results(
             with reading(path):  # around the caller's block, too, in which rows are read
                 scenes = {scene.name: scene for scene in _scenes(stored, file, verify, only)}
                 yield OpenResults(
-                    path, stored.attributes, {name: scenes[name] for name in natural_order(scenes)}
+                    path,
+                    stored.attributes,
+                    {name: scenes[name] for name in natural_order(scenes)},
+                    list(stored.tables[RUNS].runs) if RUNS in stored.tables else [],
                 )
             return
     raise StoreError(f"{path}: is being replaced by another process")

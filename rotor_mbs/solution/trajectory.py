@@ -396,11 +396,9 @@ class Solution:
         last = float(self.time[-1]) if len(self.time) else self.integration.time_reached
         reached = f"{last:g} s of {self.scene.duration:g} s, {len(self.time)} samples"
         shown = comparison(self.metrics, self.scene.duration)
-        error = (
-            f"{shown.error}, limit {OK_ERROR:g}, compared to {shown.compared}"
-            if shown.error
-            else ""
-        )
+        error = f"{shown.error}, limit {OK_ERROR:g}" if shown.error else ""
+        if shown.compared:  # a run of a sweep stores no horizon unless its error growth is computed
+            error += f", compared to {shown.compared}"
         rows = {
             "method": self.method,
             "status": self.status or "not assessed",
