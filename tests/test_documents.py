@@ -33,7 +33,9 @@ def commands(text: str) -> list[list[str]]:
     """Every call of rotor-mbs in an indented line, without what the shell does around it."""
     lines = [line.split("#")[0] for line in text.splitlines() if line.startswith("    ")]
     parts = [
-        part.strip() for line in lines for part in re.split(r"&&|\|\|", line.replace("exec ", ""))
+        re.sub(r" > \S+$", "", part.strip())
+        for line in lines
+        for part in re.split(r"&&|\|\|", line.replace("exec ", ""))
     ]
     calls = [part for part in parts if re.match(r"(\.venv/bin/|- run: )?rotor-mbs ", part)]
     return [
@@ -198,6 +200,9 @@ BEFORE = {
         "run paper/fig08 -m lagrange/dop853 -m exudyn_tree/rk67 -o main/results.h5",
     ],
     "compare.md": ["export paper/fig11 --to csv -o mine.csv"],
+    "data.md": [
+        "run paper/fig11 -m lagrange/taylor -m exudyn_tree/rk67 -o rotor-mbs-out/results.h5"
+    ],
 }
 # Commands that would take minutes, with what makes them short; others of the documents are run as
 # they stand.
