@@ -19,15 +19,16 @@ from rotor_mbs.comparison.data import ForeignData
 from rotor_mbs.solution.defects import FLOOR_SAFETY
 from rotor_mbs.solution.trajectory import Array
 
-_DEGREE, _TURN = math.pi / 180.0, 2.0 * math.pi
+DEGREE, _TURN = math.pi / 180.0, 2.0 * math.pi
+DEGREE_TEXTS = {"angle": "degrees taken as rad", "rate": "deg/s taken as rad/s"}
 _FACTORS = {
     "angle": (
-        (_DEGREE, "degrees taken as rad"),
-        (1.0 / _DEGREE, "rad taken as degrees"),
+        (DEGREE, DEGREE_TEXTS["angle"]),
+        (1.0 / DEGREE, "rad taken as degrees"),
         (_TURN, "turns taken as rad"),
     ),
     "rate": (
-        (_DEGREE, "deg/s taken as rad/s"),
+        (DEGREE, DEGREE_TEXTS["rate"]),
         (_TURN / 60.0, "rpm taken as rad/s"),
         (_TURN, "Hz taken as rad/s"),
     ),

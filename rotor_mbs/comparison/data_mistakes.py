@@ -15,6 +15,8 @@ from scipy.optimize import linear_sum_assignment
 
 from rotor_mbs.comparison.channels import channels
 from rotor_mbs.comparison.column_readings import (
+    DEGREE,
+    DEGREE_TEXTS,
     HELD,
     LATE_OR_EARLY,
     ColumnReadings,
@@ -447,6 +449,14 @@ def _column_hypotheses(
     chosen, largest = _nearest_channels(inside, states, carried)
     if largest <= search.allowed and chosen != columns:
         yield _exchange(search.scene, data, chosen)
+        return
+    # Columns that are exchanged often come with degrees: alone, neither mistake explains the data.
+    chosen, largest = _nearest_channels(_from_degrees(inside), states, carried)
+    if largest <= search.allowed and chosen != columns:
+        exchange = _exchange(search.scene, _from_degrees(data), chosen)
+        mistakes = (*_degree_texts(data), *exchange.change.mistakes)
+        correction = Correction(exchange.change.data, mistakes)
+        yield Hypothesis("; and ".join(mistakes), correction, len(mistakes))
 
 
 def _may_explain(search: TrajectorySearch, inside: ForeignData, *, with_factor: bool) -> bool:
@@ -470,7 +480,11 @@ def _may_explain(search: TrajectorySearch, inside: ForeignData, *, with_factor: 
         # Of a column that is held or limited, a window may show too little.
         if all(held_rows(window.values[:, [j]]) != 1 or readings.best(j) for j in places):
             continue
-        if _nearest_channels(window, states, carried)[1] > wider.allowed:
+        largest = min(
+            _nearest_channels(columns, states, carried)[1]
+            for columns in (window, _from_degrees(window))
+        )
+        if largest > wider.allowed:
             return False
     return True
 
@@ -524,6 +538,21 @@ def _nearest_channels(
     _, exchanged = linear_sum_assignment(sizes)
     chosen = min(exchanged, sizes.argmin(axis=1), key=lambda columns: errors[places, columns].max())
     return chosen.tolist(), float(errors[places, chosen].max())
+
+
+def _from_degrees(data: ForeignData) -> ForeignData:
+    """Return data whose angles are in degrees, and rates in deg/s, with both in rad and rad/s."""
+    return replace(data, values=DEGREE * data.values, rounding=DEGREE * data.rounding)
+
+
+def _degree_texts(data: ForeignData) -> list[str]:
+    """Return a text for the angles of data, and one for the rates, that all are in degrees."""
+    texts = []
+    for kind, text in DEGREE_TEXTS.items():
+        names = [channel.name for channel in data.channels if channel.kind == kind]
+        if names:
+            texts.append(f"{', '.join(names)}: {text}")
+    return texts
 
 
 def _corrected_channels(readings: ColumnReadings) -> Hypothesis[Correction] | None:

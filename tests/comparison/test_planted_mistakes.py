@@ -440,6 +440,34 @@ def test_a_mistake_is_named(name: str) -> None:
     )
 
 
+@pytest.mark.parametrize("with_rates", [False, True])
+def test_exchanged_columns_in_degrees_are_two_mistakes(*, with_rates: bool) -> None:
+    """Neither of them alone explains the data."""
+    _, angles, rates = columns(0, 1, 3, 2)(*Plant("").data().values())
+    data = {"time": np.linspace(0.0, DURATION, ROWS), "angles": np.degrees(angles)}
+    expected = [
+        "rotor, pitch 1, pitch 2, pitch 3: degrees taken as rad",
+        "columns exchanged: pitch 2 is pitch 3, pitch 3 is pitch 2",
+    ]
+    if with_rates:
+        data["rates"] = np.degrees(rates)
+        expected[1:] = [
+            "rotor rate, pitch 1 rate, pitch 2 rate, pitch 3 rate: deg/s taken as rad/s",
+            f"{expected[1]}, pitch 2 rate is pitch 3 rate, pitch 3 rate is pitch 2 rate",
+        ]
+    comparison = rm.compare(data, short("paper/fig11"))
+    assert (comparison.status, list(comparison.likely)) == ("inaccurate", expected)
+
+
+def test_exchanged_columns_in_degrees_are_not_named_where_a_blade_is_wrong() -> None:
+    data = Plant("", changed=off("mass", 0.05), scene="paper/fig15-10kNm").data()
+    data |= {name: np.degrees(data[name]) for name in ("angles", "rates")}
+    data["angles"][:, 1] += np.linspace(0.0, 3.0, ROWS)  # deg: the motion of no blade
+    comparison = rm.compare(data, short("paper/fig15-10kNm"))
+    assert comparison.status == "inaccurate"
+    assert not any("exchanged" in text for text in comparison.likely), comparison.likely
+
+
 def test_what_is_within_the_tolerance_but_not_random_is_named() -> None:
     """A mass that the motion cannot tell from a torque: both are named, also where the tolerance
     allows it."""
