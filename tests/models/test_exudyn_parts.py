@@ -82,6 +82,20 @@ def test_a_scene_builds_what_it_needs_and_no_more(scene, tree, chain) -> None:
 
 
 @pytest.mark.parametrize(
+    ("scene", "words"),
+    [
+        ("bare", ""),
+        ("gravity", ", gravity"),
+        ("springs", ", bearing stiffness"),
+        ("dampers", ", damping"),
+    ],
+)
+def test_the_list_says_what_the_object_of_the_tree_has(scene: str, words: str) -> None:
+    (tree,) = (item for item in METHODS[TREE].items(SCENES[scene]) if item.kind == "object")
+    assert tree.detail == f"ObjectKinematicTree: 4 links{words}"
+
+
+@pytest.mark.parametrize(
     ("outputs", "damping", "along_the_path"),
     [
         (("angles", "energy"), 1.0, True),

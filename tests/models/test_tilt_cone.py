@@ -234,13 +234,13 @@ def test_the_order_of_convergence_is_that_of_upright_rotors(method: str, order: 
     ],
 )
 def test_blades_without_pitch_inertia_lean_with_the_hub(method: str) -> None:
-    """A coned rod on its pitch axis, fixed to the hub, beside a blade that pitches."""
+    """A coned rod on its pitch axis, fixed to the hub, between blades that pitch."""
     skip_if_missing(method)
     rod = replace(AXIAL, inertia=(12.0, 12.0, 0.0, 0.0, 0.0, 0.0), cone=0.3)
     scene = make_scene(
-        [0.4, 0.5, 0.2],
-        [1.0, 0.0, 0.3],
-        (rod, replace(STOUT, cone=-0.2)),
+        [0.4, 0.2, 0.5, -0.1],
+        [1.0, 0.3, 0.0, 0.2],
+        (replace(STOUT, cone=-0.2), rod, STOUT),
         shaft_tilt=0.2,
         hub_radius=0.5,
         hub_mass=9.0,
