@@ -37,6 +37,8 @@ MEMORY_OF_BYTE = 16
 # cannot limit processor time.
 _WAIT_S = 300.0
 _SET_UP_S = 60.0  # for the start of the worker
+_TRIES = 2  # to read a file, if the worker is killed from outside
+_KILLED = -9  # exit code of a process that SIGKILL ended
 
 
 def _load() -> None:
@@ -76,7 +78,8 @@ def read_in_worker(path: Path, read: Callable[[Path, T], R], argument: T) -> R:
     StoreError
         If the file cannot be read within the limits, and what `read` raises.
     ResourceError
-        If the worker process cannot be started, or the system lacks memory to read the file.
+        If the worker process cannot be started or is killed again and again, or the system lacks
+        memory to read the file.
     """
     from rotor_mbs.scenario.catalogue import REFERENCES  # late: the worker does without
 
@@ -89,7 +92,7 @@ def read_in_worker(path: Path, read: Callable[[Path, T], R], argument: T) -> R:
     seconds = TIME_S + TIME_OF_BYTE_S * size
     memory = int(MEMORY + MEMORY_OF_BYTE * size)
     is_over_limit = True  # unless the worker returns
-    with suppress(TaskLostError):
+    for _ in range(_TRIES):
         try:
             value, is_over_limit = _worker.run(
                 _read_limited, (seconds, memory, read, path, argument), _WAIT_S + seconds
@@ -98,6 +101,14 @@ def read_in_worker(path: Path, read: Callable[[Path, T], R], argument: T) -> R:
                 return cast(R, value)
         except MemoryError:  # of this process, which receives what was read
             is_over_limit = False
+        except TaskLostError as exc:
+            # At its limits the worker ends otherwise: it was killed by a user, or by a system that
+            # lacked memory.
+            if exc.exit_code == _KILLED:
+                continue
+        break
+    else:
+        raise ResourceError(f"{path}: the process that reads it was killed {_TRIES} times")
     # If the memory of this process is limited to less, so is the worker's, and its end says nothing
     # of the file.
     if not is_over_limit or address_space() < memory:

@@ -20,7 +20,7 @@ from support.commands import rotor_mbs
 from support.forging import append_trailer
 
 import rotor_mbs as rm
-from rotor_mbs.errors import StoreError
+from rotor_mbs.errors import ResourceError, StoreError
 from rotor_mbs.runs import hdf5, untrusted
 from rotor_mbs.runs.trailer import read_trailer
 from rotor_mbs.runs.untrusted import read_in_worker
@@ -238,3 +238,24 @@ def test_the_worker_needs_no_more_than_it_reads_with() -> None:
         "rotor_mbs.runs.table",
         "scipy",
     }
+
+
+def _killed(_path: Path, marks: Path) -> int:
+    """Leave a mark, and kill this process, as often as the first mark says; then return the number
+    of marks."""
+    count = len(list(marks.glob("mark-*")))
+    if count < int((marks / "kills").read_text()):
+        (marks / f"mark-{count}").touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return count
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="needs SIGKILL")
+def test_a_reader_that_is_killed_from_outside_says_nothing_of_the_file(tmp_path: Path) -> None:
+    """As by a system that lacks memory: the file is read again, and never called damaged."""
+    file = Path(shutil.copy(REFERENCES / "stiff.h5", tmp_path))
+    (tmp_path / "kills").write_text("1")
+    assert read_in_worker(file, _killed, tmp_path) == 1
+    (tmp_path / "kills").write_text("3")
+    with pytest.raises(ResourceError, match="the process that reads it was killed 2 times"):
+        read_in_worker(file, _killed, tmp_path)
