@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from support.defects import made_defects
+from support.random_scenes import leaning_scene
 
 from rotor_mbs.analysis import judgement as judgement_module
 from rotor_mbs.analysis import kinematics, run_checks
@@ -485,7 +486,9 @@ def test_errors_are_stored_as_far_as_they_are_known(
     assert given == names
 
 
-@pytest.mark.parametrize("scene", find_scenes(["check"]), ids=lambda scene: scene.name)
+@pytest.mark.parametrize(
+    "scene", [*find_scenes(["check"]), leaning_scene(1)], ids=lambda scene: scene.name
+)
 def test_the_rotors_share_of_inertia_is_that_of_its_mass_matrix(scene: Scene) -> None:
     """At random angles; T is ½ q̇·M q̇, so that M follows by polarisation from the kinetic
     energy."""

@@ -305,6 +305,132 @@ def test_a_defect_that_is_allowed_and_could_be_seen_in_a_plot_is_counted() -> No
         assert metrics["defect_judged"] == pytest.approx(1e-6 * size)
 
 
+# A rotor that moves and a pitch that is fixed, in four intervals: the largest defect is of its angle,
+# of the pitch, of its rate (2 rad/s are a radian), and of the rate of the pitch (4 rad/s are one).
+# The angle of the rotor is rounded by 1e-10 rad in each row, which three times makes 6e-10 in an
+# interval.
+FOUR = (1e-9, 2e-9, 3e-9, 5e-9)
+
+
+def four_intervals(**changes: Any) -> Defects:
+    rounding = np.zeros((5, 2))
+    rounding[:, 0] = 1e-10
+    fields: dict[str, Any] = {
+        "angles": np.array([[1e-9, 0.0], [0.0, -2e-9], [0.0, 0.0], [0.0, 0.0]]),
+        "rates": np.array([[0.0, 0.0], [0.0, 0.0], [-6e-9, 0.0], [0.0, 20e-9]]),
+        "rate_units": np.array([2.0, 4.0]),
+        "rounding": rounding,
+    }
+    return made_defects(FOUR, **(fields | changes))
+
+
+def test_a_fixed_pitch_and_the_rates_in_their_units_count_like_the_moving_angles() -> None:
+    defects = four_intervals()
+    assert defects.sizes == pytest.approx(FOUR, rel=1e-12, abs=0.0)
+    expected = [[4e-10, 0.0], [0.0, 0.0], [0.0, 3e-9], [0.0, 0.0]]
+    np.testing.assert_allclose(defects.channel_excess, expected, rtol=1e-7, atol=1e-17)
+    assert defects.excess == pytest.approx([4e-10, 14e-10, 3e-9, 44e-10], rel=1e-7, abs=0.0)
+    assert defects.mean == pytest.approx(5e-9 / 4.0, rel=1e-12, abs=0.0)
+    # of a fixed pitch, too, a defect that is not finite is one
+    rates = defects.rates.copy()
+    rates[0, 1] = np.nan
+    assert list(four_intervals(rates=rates).excess[:1]) == [np.inf]
+
+
+def test_defects_of_every_coordinate_are_divided_by_the_factor_of_their_interval() -> None:
+    defects = four_intervals(time=np.array([0.0, 0.01, 0.21, 0.22, 0.32]))
+    excess = 1e-9 * np.array([[1.0, 2.0], [3.0, 4.0], [5.0, 6.0], [7.0, 8.0]])
+    by_unit = defects.in_bound_units(excess)
+    np.testing.assert_allclose(
+        by_unit, excess / np.array([[1.0], [20.0], [1.0], [10.0]]), rtol=1e-9
+    )
+
+
+def test_the_error_growth_begins_with_one_and_is_that_of_the_product() -> None:
+    defects = made_defects((0.0,) * 3, transitions=np.tile(np.diag([3.0, 0.5]), (3, 1, 1)))
+    assert list(defects.error_growth) == pytest.approx([1.0, 3.0, 9.0, 27.0], rel=1e-12)
+    assert [defects.horizon_samples(limit) for limit in (2.0, 10.0, 30.0)] == [1, 3, 4]
+
+
+# Nine radians at 100 rad/s are nine steps, of independent errors: three units of 500 rad.
+FAST = {"time": 0.09 * np.arange(5.0), "states": np.tile([500.0, 100.0], (5, 1))}
+
+
+def test_the_arithmetic_of_an_interval_adds_up_as_the_root_of_its_radians() -> None:
+    floors = made_defects((0.0,) * 4, **FAST).floors
+    np.testing.assert_allclose(floors, 3.0 * 500.0 * 2.0**-52, rtol=1e-5)
+
+
+@pytest.mark.parametrize(("growth", "factor"), [(0.5, 1.0), (1.2, 1.2**4), (1.0, 1.0)])
+def test_the_arithmetic_over_rows_adds_up_as_their_root_and_grows(
+    growth: float, factor: float
+) -> None:
+    """And by how much it grows counts, but not by how much it shrinks."""
+    transitions = np.tile(np.diag([growth, growth]), (4, 1, 1))
+    _, floors = made_defects((0.0,) * 4, transitions=transitions, **FAST).over_rows(4)
+    expected = 2.0 * factor * 3.0 * 500.0 * 2.0**-52
+    np.testing.assert_allclose(floors, [[expected, expected]], rtol=1e-5)
+
+
+def test_a_coordinate_that_is_not_rounded_feels_the_square_of_what_others_are() -> None:
+    rounding = np.zeros((3, 2))
+    rounding[:, 0] = 1e-3
+    floors = made_defects((0.0, 0.0), rounding=rounding).floors
+    np.testing.assert_allclose(floors, [[2e-3 + 4e-6, 4e-6]] * 2, rtol=1e-9)
+
+
+def test_the_error_of_a_pitch_that_rests_at_zero_is_the_pitch_itself() -> None:
+    """Whatever the rotor's error is: it moves the rotor on, and no error moves the pitch."""
+    matrices = np.tile(np.eye(4), (2, 1, 1))
+    matrices[:, 1, 0] = 5.0  # of the pitch by the rotor
+    matrices[:, 0, 1] = 2.0  # of the rotor by the pitch
+    states = np.zeros((3, 4))
+    states[:, 1] = [0.0, 1e-9, 4e-9]
+    defects = made_defects(
+        (0.0, 0.0),
+        angles=np.array([[-1e-9, 7.0], [-1e-9, 7.0]]),
+        rates=np.zeros((2, 2)),
+        rate_units=np.ones(2),
+        moving=(0, 1),
+        resting=(1,),
+        states=states,
+        rounding=np.zeros((3, 4)),
+        start=np.zeros(4),
+        growth_units=np.ones(4),
+        transitions=matrices,
+    )
+    np.testing.assert_allclose(
+        defects.predicted, [[0.0, 0.0], [1e-9, 1e-9], [4e-9, 4e-9]], rtol=1e-12
+    )
+
+
+def test_the_matrices_of_a_long_run_are_not_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Asked for a few rows at a time; those of a short one are asked for once."""
+    monkeypatch.setattr(solution_defects, "BLOCK_ROWS", 2)
+    for kept_rows, expected in ((4, {4}), (3, {2})):
+        monkeypatch.setattr(solution_defects, "KEPT_ROWS", kept_rows)
+        asked: list[int] = []
+
+        def find(rows: slice, asked: list[int] = asked) -> Array:
+            asked.append(rows.stop - rows.start)
+            return np.tile(np.eye(2), (asked[-1], 1, 1))
+
+        defects = replace(made_defects((0.0,) * 4), find_transitions=find)
+        assert (defects.excess == 0.0).all()
+        assert (defects.error_growth == 1.0).all()
+        assert {*asked} == expected
+        assert len(asked) == (1 if kept_rows == 4 else 4)
+
+
+def test_the_floor_of_a_run_is_its_largest_that_is_known() -> None:
+    rounding = np.zeros((4, 2))
+    rounding[1, 0] = 1e-10
+    for last, floor in ((2e-10, 2e-10), (np.inf, 1e-10)):
+        rounding[3, 0] = last
+        metrics = defect_metrics(made_defects((0.0,) * 3, rounding=rounding), None)
+        assert metrics["defect_floor"] == pytest.approx(floor, rel=1e-7, abs=0.0)
+
+
 def wild(rate: float, rows: slice) -> Solution:
     """A run with rates that no motion of the scene has."""
     solution = solve(DOP853, FIG11, {})
@@ -496,7 +622,8 @@ def test_what_is_worked_on_block_by_block_is_as_of_all_at_once(
         beyond = np.flatnonzero(whole.error_growth >= limit)
         assert parts.horizon_samples(limit) == (beyond[0] if len(beyond) else len(whole.time))
     np.testing.assert_allclose(parts.predicted, whole.predicted, rtol=1e-9, atol=1e-15)
-    np.testing.assert_allclose(parts.over_rows(7), whole.over_rows(7), rtol=1e-9)
+    for rows in (7, 40):  # fewer and more than a block has
+        np.testing.assert_allclose(parts.over_rows(rows), whole.over_rows(rows), rtol=1e-9)
     for defects in (parts, whole):
         sums, _ = defects.over_rows(10)
         assert defects.drift >= sums.max() * (1.0 - 1e-9)

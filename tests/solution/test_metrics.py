@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.scenes import paper
+from support.defects import made_defects
+from support.scenes import make_scene, paper
 
 import rotor_mbs as rm
 from rotor_mbs.analysis.judgement import judge
@@ -15,8 +16,9 @@ from rotor_mbs.errors import InputError
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.runs.design import columns_in, metric_columns
 from rotor_mbs.scenario.catalogue import find_scenes
-from rotor_mbs.solution.metrics import METRICS, metrics_of
-from rotor_mbs.solution.quantities import LOADS
+from rotor_mbs.scenario.scene import Blade, Scene
+from rotor_mbs.solution.metrics import HORIZON_GROWTH, METRICS, energy_drifts, metrics_of
+from rotor_mbs.solution.quantities import LOADS, energy_balance
 from rotor_mbs.solution.trajectory import Array, Solution, Trajectory
 
 SCENE = paper("fig08", duration=2.0, samples=201, outputs=("angles",))
@@ -116,6 +118,103 @@ def test_a_load_that_is_off_is_inaccurate(run: Solution, load: str) -> None:
         assert load.replace("_", " ") in result.message
         assert result.metrics[metric] == pytest.approx(share, rel=0.1)
         assert result.false_success is is_false
+
+
+def beyond_the_horizon(run: Trajectory) -> Trajectory:
+    """As a reference that is of no use from its second half on."""
+    half = len(run.time) // 2
+    growth = np.where(np.arange(len(run.time)) < half, 1.0, 2.0 * HORIZON_GROWTH)
+    return run.replace(error_growth=growth)
+
+
+def test_a_wrong_load_or_a_gap_beyond_the_horizon_counts(run: Solution) -> None:
+    """Neither is compared with the reference: at its own state a load is known, and a joint is
+    closed. An angle is compared."""
+    exact = run.trajectory
+    angles, force = exact.angles.copy(), exact.blade_root_force.copy()
+    angles[-1, 0] += 1.0
+    force[-1, 0, 0] += 1e3
+    gap = np.zeros(len(exact.time))
+    gap[-1] = 0.1
+    wrong = exact.replace(angles=angles, blade_root_force=force, constraint_error=gap)
+    defects = made_defects((0.0,) * (len(exact.time) - 1), time=exact.time, own_loads=exact)
+    metrics = metrics_of(LOADED, wrong, beyond_the_horizon(exact), defects)
+    largest = np.linalg.norm(force, axis=2).max()
+    assert metrics["blade_root_force_error"] == pytest.approx(1e3 / largest, rel=1e-9)
+    assert metrics["constraint_error_max"] == 0.1
+    assert (metrics["angle_error_max"], metrics["angle_error_whole"]) == (0.0, 1.0)
+
+
+def test_errors_of_angles_need_a_reference_with_rows_and_a_scene_that_wants_angles() -> None:
+    given, none = motion(TIME, TIME), Trajectory(TIME[:0], np.empty((0, 4)), np.empty((0, 4)))
+    assert "angle_error_whole" in metrics_of(SCENE, given, given)
+    assert "angle_error_whole" not in metrics_of(SCENE, given, none)
+    others = replace(SCENE, outputs=("rates",))
+    assert "angle_error_whole" not in metrics_of(others, given, given)
+
+
+# One blade of 10 kg with its centre of mass at 5 m, under 2 m/s²: 100 J; a bearing of 200 N m/rad
+# that is 0.5 rad from rest at the start: 25 J.
+HEAVY = make_scene(
+    (0.0, 0.6),
+    (0.0, 0.0),
+    blades=(Blade(10.0, (3.0, 0.0, 4.0), (1.0, 1.0, 1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 5.0)),),
+    gravity=2.0,
+    bearing_stiffness=(200.0,),
+    bearing_rest=(((0.0, 0.1), (1.0, 0.4)),),
+)
+
+
+def with_energies(kinetic: list[float], potential: list[float], work: list[float]) -> Trajectory:
+    rows = np.zeros((len(kinetic), 2))
+    return Trajectory(
+        np.linspace(0.0, 1.0, len(kinetic)),
+        rows,
+        rows,
+        kinetic_energy=np.array(kinetic),
+        potential_energy=np.array(potential),
+        work=np.array(work),
+    )
+
+
+@pytest.mark.parametrize(
+    ("scene", "kinetic", "potential", "work", "scale", "drift"),
+    [
+        (HEAVY, [60.0, 0.0], [0.0, 43.0], [0.0, -15.0], 200.0, 0.01),
+        # the largest is below zero
+        (HEAVY, [60.0, 70.0, 50.0], [0.0] * 3, [0.0, 5.0, -15.0], 200.0, 0.025),
+        # in joules, where nothing moves and nothing has weight
+        (
+            replace(HEAVY, gravity=0.0, bearing_stiffness=(), bearing_rest=()),
+            [0.0, 3.0],
+            [0.0] * 2,
+            [0.0] * 2,
+            0.0,
+            3.0,
+        ),
+    ],
+    ids=["two samples", "three samples", "no scale"],
+)
+def test_the_drift_of_the_energy_is_relative_to_all_energies(
+    scene: Scene,
+    kinetic: list[float],
+    potential: list[float],
+    work: list[float],
+    scale: float,
+    drift: float,
+) -> None:
+    """Of a run, and of many runs side by side."""
+    run = with_energies(kinetic, potential, work)
+    metrics = metrics_of(scene, run, None)
+    assert metrics["energy_scale_J"] == pytest.approx(scale, rel=1e-12)
+    assert metrics["energy_drift_max"] == pytest.approx(drift, rel=1e-12)
+    energies = [np.array([values]) for values in (kinetic, potential, work)]
+    drifts = energy_drifts([scene], energies[0], energies[2], energy_balance(*energies))
+    assert drifts == pytest.approx([drift], rel=1e-12)
+
+
+def test_a_single_sample_has_no_drift() -> None:
+    assert "energy_drift_max" not in metrics_of(HEAVY, with_energies([1.0], [0.0], [0.0]), None)
 
 
 def test_loads_are_drawn_from_python() -> None:

@@ -90,9 +90,14 @@ EXPLAINED = {
     r"adapter\.linearized .*0 -> 1": (
         "a column of zeros among the joints' directions hinders no motion"
     ),
-    r"metrics\.energy_scale .*(if run\.|and, or in|0\.0 -> )": (
-        "nobody asks for the scale of a run without energies"
+    r"metrics\.energy_drifts .* 1 -> 2$": (
+        "time and angles of a motion without energies, which are not read"
     ),
+    r"defects\.over_rows .*sign of -self\._vectors": "of the sums the magnitude is taken",
+    r"defects\.over_rows .* 1 -> 2$": (
+        "stretches at once: two in place of one, where a block has room for none"
+    ),
+    r"defects\.horizon_samples .*left side of 1 \+ block\.start": "the fraction of 1.5 is cut off",
     r"checks\._own_extremes .*:20 2 -> 3$": "samples of a part that are not read",
     # Not the original, and not seen all the same: tolerances, first steps and counts that are not
     # judged.
@@ -103,9 +108,10 @@ EXPLAINED = {
     r"time_table\.values_before .*1e-12 scaled": (
         "keeps rounding from passing a jump: any size near it does"
     ),
-    r"defects\._SMALLEST_FLOOR ": (
-        "keeps a floor from being zero: any size far below round-off of a radian does"
-    ),
+    (
+        r"defects\.(_SMALLEST_FLOOR |_with_small_numbers .*right side of floors \+ np\.square"
+        r"\(floors\.max\(axis=1, keepdims=True, initial scaled$)"
+    ): "keeps a floor from being zero: any size far below round-off of a radian does",
     r"defects\.KEPT_ROWS ": "decides how much memory a run takes, not what comes out",
     r"judgement\.smallest_rotor_inertia_share .*65 -> 66": (
         "points of a search along the way to the next sample"
