@@ -181,7 +181,7 @@ def with_energies(kinetic: list[float], potential: list[float], work: list[float
     ("scene", "kinetic", "potential", "work", "scale", "drift"),
     [
         (HEAVY, [60.0, 0.0], [0.0, 43.0], [0.0, -15.0], 200.0, 0.01),
-        # the largest is below zero
+        # a gain, where the one above is a loss
         (HEAVY, [60.0, 70.0, 50.0], [0.0] * 3, [0.0, 5.0, -15.0], 200.0, 0.025),
         # in joules, where nothing moves and nothing has weight
         (

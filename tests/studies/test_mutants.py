@@ -95,7 +95,7 @@ EXPLAINED = {
     ),
     r"defects\.over_rows .*sign of -self\._vectors": "of the sums the magnitude is taken",
     r"defects\.over_rows .* 1 -> 2$": (
-        "stretches at once: two in place of one, where a block has room for none"
+        "stretches at once: two, where a block has room for one at most"
     ),
     r"defects\.horizon_samples .*left side of 1 \+ block\.start": "the fraction of 1.5 is cut off",
     r"checks\._own_extremes .*:20 2 -> 3$": "samples of a part that are not read",
