@@ -112,6 +112,12 @@ EXPLAINED = {
         r"defects\.(_SMALLEST_FLOOR |_with_small_numbers .*right side of floors \+ np\.square"
         r"\(floors\.max\(axis=1, keepdims=True, initial scaled$)"
     ): "keeps a floor from being zero: any size far below round-off of a radian does",
+    r"lagrange\.defects\._(MAX_STEPS_\w+|FEWEST_STEPS|EVALUATIONS_PER_STEP|MAX_RUNGE_KUTTA_STEPS) ": (
+        "a limit of steps that no motion of a rotor comes near, or where either way is as good"
+    ),
+    r"lagrange\.defects\._(DOP853|RADIANS_PER_STEP|ROUGH_END) ": (
+        "half as much again is within the accuracy that is asked of the matrices, or of a defect"
+    ),
     r"defects\.KEPT_ROWS ": "decides how much memory a run takes, not what comes out",
     r"judgement\.smallest_rotor_inertia_share .*65 -> 66": (
         "points of a search along the way to the next sample"
