@@ -19,6 +19,7 @@ from rotor_mbs.analysis import checks
 from rotor_mbs.analysis.judgement import bounds_of, defects_of, judge
 from rotor_mbs.analysis.run_checks import (
     RunSamples,
+    defect_allowed,
     defect_bound,
     energy_slack,
     quantity_errors,
@@ -27,6 +28,7 @@ from rotor_mbs.analysis.run_checks import (
 )
 from rotor_mbs.methods.catalogue import REFERENCE
 from rotor_mbs.methods.solve import solve
+from rotor_mbs.models.lagrange.samples import load_conditioning, load_rounding
 from rotor_mbs.report.paper_figures import available
 from rotor_mbs.runs.read import open_results
 from rotor_mbs.scenario.accuracy_bounds import shipped_bounds
@@ -34,9 +36,10 @@ from rotor_mbs.scenario.catalogue import REFERENCES
 from rotor_mbs.solution.defects import Defects
 from rotor_mbs.solution.metrics import Metrics, defect_metrics, energy_scale, metrics_of
 from rotor_mbs.solution.quantities import energy_error
-from rotor_mbs.solution.trajectory import Solution, Trajectory
+from rotor_mbs.solution.trajectory import Integration, Solution, Trajectory
 
 METHOD, PRINTED, BOUNDS = "lagrange/dop853", "printed/ode45", shipped_bounds()
+OWN = "own/engine"  # without a bound of its own
 LOADED = shipped("check/loads")
 FIG11 = paper("fig11", samples=101)
 ANGLES, RATE = {"rotor_angle_min", "rotor_angle_max"}, {"rotor_rate_max"}
@@ -142,6 +145,33 @@ def test_numbers_of_a_model_are_its_metrics_less_what_rounding_and_its_start_lea
     assert 0.0 < start_slack(away) < found["error", "angles"]
     drift = metrics["energy_drift_max"] - energy_slack(away, run.trajectory)
     assert found["energy", "balance"] == pytest.approx(drift, rel=1e-12)
+    # Of an error that is predicted the start leaves as much open.
+    alone = {"angle_error_predicted": 3.0 * start_slack(away), "horizon_s": 0.5}
+    predicted = values(checked(replace(run, scene=away), alone))
+    assert predicted["error", "angles, predicted"] == pytest.approx(
+        2.0 * start_slack(away), rel=1e-12
+    )
+
+
+@pytest.mark.parametrize("side", [0.9, 1.1])
+def test_work_that_an_engine_integrates_is_as_accurate_as_its_balance_of_energy(
+    side: float,
+) -> None:
+    """That of a method of this package is a function of the angles."""
+    assert BOUNDS.of("energies", METHOD).value < BOUNDS.of("energy", METHOD).value
+    assert BOUNDS.of("energies", OWN).value < BOUNDS.of("energy", OWN).value
+    for method, check in ((METHOD, "energies"), (OWN, "energy")):
+        run = run_of(rotor_torque=((0.0, 30.0),))
+        scale = max(
+            energy_scale(run.scene, run.trajectory), float(run.trajectory.kinetic_energy.max())
+        )
+        run.trajectory.work[3] += side * BOUNDS.of(check, method).value * scale
+        (work,) = (
+            found
+            for found in checked(replace(run, method=method), {})
+            if found.where.channel == "work"
+        )
+        assert work.passed is (side < 1.0)
 
 
 @pytest.mark.parametrize(
@@ -324,6 +354,56 @@ def test_a_turn_of_a_pendulum_is_off_by_what_was_added() -> None:
     run.trajectory.angles[7, 0] += 1e-3
     judged = of_samples(run)
     assert judged["exact", "rotor angle"] == pytest.approx(1e-3, rel=1e-6)
+
+
+def test_a_start_turns_away_leaves_its_last_digits_of_an_exact_angle_open() -> None:
+    """A scene at rest, off by twice what the start leaves open."""
+    scene = paper("fig05", duration=0.5, samples=51)
+    start = scene.initial_angles[0] + 1e7 * np.pi
+    scene = replace(
+        scene,
+        initial_angles=(start, 0.0, 0.0, 0.0),
+        initial_rates=(0.0,) * 4,
+        rotor_torque=(),
+        outputs=("angles",),
+    )
+    time = np.linspace(0.0, 0.5, 51)
+    angles = np.tile(scene.initial_angles, (51, 1))
+    angles[7, 0] += 2.0 * start_slack(scene)
+    off = angles[7, 0] - start
+    run = Solution(scene, METHOD, Trajectory(time, angles, np.zeros((51, 4))), Integration(True))
+    found = of_samples(run)["exact", "rotor angle"]
+    assert found == pytest.approx(off - start_slack(scene), rel=1e-12)
+
+
+@pytest.mark.parametrize("method", [METHOD, OWN])
+def test_an_error_of_loads_counts_beyond_what_rounding_may_cause(method: str) -> None:
+    """That of the state; of a method without a bound of its own that of its arithmetic, too."""
+    scene = replace(LOADED, duration=0.2, samples=41)
+    motion = solve(METHOD, scene, {}).trajectory
+    samples = motion.time, motion.angles, motion.rates
+    allowed = load_rounding(scene, *samples)["blade_root_force"]
+    if method == OWN:
+        lost = load_conditioning(scene, *samples)["blade_root_force"]
+        assert np.linalg.norm(lost[20, 0]) > 1e-3 * np.linalg.norm(allowed[20, 0])
+        allowed = allowed + 3.0 * lost
+    forces = motion.blade_root_force.copy()
+    forces[20, 0, 1] += 100.0 * np.linalg.norm(allowed[20, 0])
+    motion = motion.replace(blade_root_force=forces)
+    defects = defects_of(scene, motion)
+    assert defects is not None
+    metrics = metrics_of(scene, motion, None, defects)
+    run = Solution(scene, method, motion, Integration(True))
+    found = values(checked(run, metrics, defects))["loads", "blade root force"]
+    exact = defects.own_loads.blade_root_force
+    off = np.linalg.norm((forces - exact)[20, 0])
+    largest = np.linalg.norm(forces, axis=2).max()
+    expected = (off - np.linalg.norm(allowed[20, 0])) / largest
+    assert found == pytest.approx(expected, rel=1e-9, abs=0.0)
+
+
+def test_where_no_defect_is_judged_the_bound_is_what_is_allowed() -> None:
+    assert defect_allowed({}, 1e-9) == 1e-9
 
 
 @pytest.mark.parametrize(

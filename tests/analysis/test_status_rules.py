@@ -435,6 +435,59 @@ def test_past_the_horizon_no_error_counts(monkeypatch: pytest.MonkeyPatch) -> No
         assert status(with_error(exact, 0.1, 8), reference=exact)[0] == expected
 
 
+def test_a_method_that_keeps_zeros_is_advised_where_a_pitch_left_zero(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Where that is the error, and nowhere else."""
+    resting = made_defects([0.0] * 10, resting=(1,))
+    monkeypatch.setattr(judgement_module, "defects_of", lambda *_, **__: resting)
+    exact = moving()
+    for run, message, advice in (
+        (with_error(exact, 0.1, 8, 1), "pitch 1 leaves zero at t = 0.8 s", "lagrange/*"),
+        (with_error(exact, 0.1, 8, 0), "angle error 1.0e-01 rad", ""),
+        (with_drift(with_error(exact, 0.1, 8, 1), 1.0), "energy drift", ""),
+    ):
+        judgement = judge(SCENE, Solution(SCENE, METHOD, run, DONE), exact)
+        assert judgement.status == "inaccurate"
+        assert judgement.message.startswith(message)
+        assert (advice in judgement.advice) if advice else (judgement.advice == "")
+
+
+def test_of_intervals_that_are_not_judged_that_of_the_largest_growth_is_named(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Errors grow more in the first interval, which is judged."""
+    rounding = np.zeros((4, 2))
+    rounding[2, 0] = OK_ERROR  # of the row that ends the second interval and begins the third
+    growth = np.array([5.0, 2.0, 3.0])
+    defects = made_defects(
+        [0.0] * 3,
+        time=np.array([0.0, 1.0, 3.0, 7.0]),
+        rounding=rounding,
+        transitions=growth[:, None, None] * np.eye(2),
+    )
+    monkeypatch.setattr(judgement_module, "defects_of", lambda *_, **__: defects)
+    judgement = judge(SCENE, Solution(SCENE, METHOD, moving(), DONE), None)
+    assert judgement.status == "unchecked"
+    assert judgement.message.startswith(
+        "rows 4 s apart, between which errors grow 3.0e+00-fold: in 2 intervals a defect"
+    )
+
+
+@pytest.mark.parametrize("side", [1.0 - JUST, 1.0 + JUST])
+def test_an_error_of_loads_is_a_share_of_the_largest(
+    side: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Above its bound it is inaccurate, above a hundredth it is another motion."""
+    scene = replace(SCENE, outputs=(*SCENE.outputs, "loads"))
+    for limit in (BOUNDS.of("loads", METHOD).value, 1e-2):
+        metrics = {"energy_drift_max": 0.0, "blade_root_force_error": side * limit}
+        monkeypatch.setattr(judgement_module, "metrics_of", lambda *_, m=metrics, **__: dict(m))
+        judgement = judge(scene, Solution(scene, METHOD, moving(), DONE), None)
+        assert (judgement.status == "ok") == (side < 1.0 and limit < 1e-2)
+        assert judgement.false_success == (side > 1.0 and limit == 1e-2)
+
+
 def test_the_printed_equations_must_reach_the_end_no_more() -> None:
     exact = moving()
     assert status(with_drift(with_error(exact, 1.0), 1.0), reference=exact, method=PRINTED) == (

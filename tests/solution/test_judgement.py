@@ -76,6 +76,11 @@ NEAR_BOUND = {"defect_max": 1.0, "defect_excess": 1.0, "defect_judged": 1.0, "de
             "0.01 s, times length and error growth)",
         ),
         (
+            NEAR_BOUND | {"defect_excess": 1.2},
+            "defect 1.2e+00 rad in the interval up to t = 0.5 s, allowed 2.4e-12 (2e-12 rad per "
+            "0.01 s, times length and error growth)",
+        ),
+        (
             NEAR_BOUND | {"angle_error_predicted": 0.02},
             "defect 1.0e+00 rad in the interval up to t = 0.5 s, allowed 2.0e-12; predicted angle "
             "error 2.0e-02 rad up to 0.2 s",
@@ -110,7 +115,7 @@ def test_an_inaccurate_run_says_by_how_much(
     metrics = {name: value for name, value in metrics.items() if not name.startswith("angle_error")}
     monkeypatch.setattr(judgement_module, "metrics_of", lambda *_, **__: metrics | numbers)
     verdict = judge(run.scene, run, None)
-    assert (verdict.status, verdict.message) == ("inaccurate", message)
+    assert (verdict.status, verdict.message, verdict.advice) == ("inaccurate", message, "")
 
 
 def test_a_body_that_falls_free_of_its_joints() -> None:
@@ -243,6 +248,7 @@ def test_a_wrong_motion_is_unchecked_where_nothing_can_tell(
     verdict = judge(scene, run, None)
     assert verdict.status == status
     assert ("without energies" in verdict.message) == (status == "unchecked")
+    assert ("defect_allowed" in verdict.metrics) == (status == "inaccurate")
     if "angles" in outputs:
         exact = Trajectory(time, angles + 0.1, np.zeros((11, 4)), error_growth=np.ones(11))
         assert judge(scene, run, exact).status == "inaccurate"

@@ -99,6 +99,11 @@ EXPLAINED = {
     ),
     r"defects\.horizon_samples .*left side of 1 \+ block\.start": "the fraction of 1.5 is cut off",
     r"checks\._own_extremes .*:20 2 -> 3$": "samples of a part that are not read",
+    r"run_checks\._checks_of_quantities .*and, or in scene\.wants": (
+        "what rounding may cause is not read without loads, and not without those of the closed "
+        "form, which come with the defects"
+    ),
+    r"run_checks\.defect_allowed .*:85 0\.0 -> ": "an interval has both numbers or neither",
     # Not the original, and not seen all the same: tolerances, first steps and counts that are not
     # judged.
     r"sensor_samples\.work .*(1e-09 \* scene\.duration|scene\.samples - 1|slack scaled)": (
@@ -121,6 +126,10 @@ EXPLAINED = {
     r"defects\.KEPT_ROWS ": "decides how much memory a run takes, not what comes out",
     r"judgement\.smallest_rotor_inertia_share .*65 -> 66": (
         "points of a search along the way to the next sample"
+    ),
+    r"judgement\._CLEAR_SHARE ": (
+        "decides how many runs of a sweep are judged one by one, not what they are called: any far "
+        "above round-off does"
     ),
     r"run_checks\.(_GROWN |_error_fault .*_GROWN )": "an order of magnitude, for a message",
     r"checks\._MOST_INTERVALS ": (
