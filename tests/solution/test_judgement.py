@@ -258,6 +258,8 @@ def test_a_wrong_motion_is_unchecked_where_nothing_can_tell(
 def test_a_start_turns_away_excuses_no_error(turns: float) -> None:
     """Errors are relative to how far the rotor turns and to the pitches, not to where the rotor's
     angle starts."""
+    if turns and not is_available():
+        pytest.skip("the rounding of such an angle keeps DOP853 at its tightest from going on")
     scene = turned(paper("fig11", duration=2.0, samples=21, outputs=("angles", "rates")), turns)
     exact = solve("reference", scene, {}).trajectory
     for column in (0, 2):
