@@ -453,7 +453,9 @@ def delayed_interrupts() -> Iterator[None]:
     before: dict[signal.Signals, Any] = {}
     try:
         for number in _SIGNALS_OF_END:
-            before[number] = signal.signal(number, lambda number, _: received.append(number))
+            # One that is ignored (nohup) stays so: a process that is started meanwhile inherits it.
+            if signal.getsignal(number) != signal.SIG_IGN:
+                before[number] = signal.signal(number, lambda number, _: received.append(number))
         yield
     finally:
         for number, handler in before.items():

@@ -22,7 +22,7 @@ import pytest
 
 from rotor_mbs.errors import ResourceError
 from rotor_mbs.processes.pool import SerialPool, TaskEnd, TaskPool, WorkerPool, run_in
-from rotor_mbs.processes.worker import TaskLostError, Worker
+from rotor_mbs.processes.worker import TaskLostError, Worker, delayed_interrupts
 
 # Beyond any start of a process on a busy machine.
 _LONG_S = 60.0
@@ -81,6 +81,24 @@ def test_an_interrupt_while_a_process_is_started_leaves_no_thread_to_wait_for() 
         check=False,
     )
     assert (ended.returncode, ended.stdout, ended.stderr) == (0, "interrupted\n", "")
+
+
+@pytest.mark.skipif(not Path("/proc/self/status").is_file(), reason="needs /proc")
+def test_a_worker_ignores_what_its_parent_ignores() -> None:
+    """As under nohup: a terminal that is closed must not end the workers."""
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        with delayed_interrupts():
+            ignored = subprocess.run(
+                [sys.executable, "-c", "import signal; print(signal.getsignal(signal.SIGHUP))"],
+                capture_output=True,
+                text=True,
+                check=True,
+            )
+        assert ignored.stdout.strip() == str(signal.SIG_IGN)
+        assert signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGHUP, before)
 
 
 def test_a_time_out_under_a_memory_limit_is_no_end_of_a_task() -> None:
