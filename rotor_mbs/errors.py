@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import traceback
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -150,6 +149,8 @@ def nearest(name: str, known: Iterable[str]) -> str:
     >>> nearest("tailor", names), nearest("euler", names[:1])
     (', perhaps lagrange/taylor', '')
     """
+    import difflib  # of use after a mistake alone; `rotor-mbs list` starts faster without it
+
     by_text = {one: one for one in known}
     # "rk67" may mean "exudyn_tree/rk67"
     by_text |= {one.rpartition("/")[2]: one for one in reversed(by_text)}

@@ -31,7 +31,6 @@ from rotor_mbs.methods.method_file import ENDING
 from rotor_mbs.methods.selection import problems_of_methods
 from rotor_mbs.processes import cores
 from rotor_mbs.runs.progress import ProgressLine
-from rotor_mbs.runs.trailer import is_of_this_program
 from rotor_mbs.scenario.catalogue import (
     MAPPING_ENDING,
     check_scene_name,
@@ -175,6 +174,8 @@ def show(arguments: argparse.Namespace) -> int:
     arguments : `scene`, the name or path; `build`, whether the items that each model builds are
         listed; `json`, whether JSON is printed.
     """
+    from rotor_mbs.runs.trailer import is_of_this_program
+
     if arguments.scene.endswith(ENDING):
         for name in check_names(arguments.scene):
             _show_method(find_method(name), as_json=arguments.json)

@@ -16,7 +16,6 @@ from rotor_mbs.methods.base import BuiltItem, Method
 from rotor_mbs.models import Ode45Settings, equation_items
 from rotor_mbs.models.printed import literal
 from rotor_mbs.models.printed.derivation import DerivedRotor, Errata
-from rotor_mbs.scenario.time_table import is_constant, torque_place, value_at
 
 if TYPE_CHECKING:  # the list of methods needs none of them
     from rotor_mbs.models.ode45 import Ode45Result, RightHandSide
@@ -207,6 +206,8 @@ def items(name: str, errata: Errata | None, scene: Scene) -> list[BuiltItem]:
 
 def _torque_tables(scene: Scene, moving: int) -> tuple[LoadTable, ...]:
     """Return τ2, then τ3 to τ5, over time, of the `moving` coordinates."""
+    from rotor_mbs.scenario.time_table import torque_place
+
     return tuple(scene.load_tables[torque_place(coordinate)] for coordinate in range(moving))
 
 
@@ -221,6 +222,8 @@ def right_hand_side(scene: Scene, accelerations: Accelerations, moving: int) -> 
     accelerations : the equations of motion.
     moving : number of coordinates that move.
     """
+    from rotor_mbs.scenario.time_table import is_constant, value_at
+
     undefined = [math.nan] * (2 * moving)
     tables = _torque_tables(scene, moving)
     # Looked up once where they are constant, as in all scenes of the paper.
