@@ -383,7 +383,9 @@ _TARGETS = (
         "*",
         "tests alone",
         (
+            "analysis/test_kinematics.py",
             "analysis/test_exact.py",
+            f"{_LEANING}a_blade_on_a_tilted_shaft_is_a_pendulum[-0.25-0.3-lagrange/taylor]",
             "analysis/test_claims.py",
             "analysis/test_checks.py",
             f"{_CHECK}what_is_shipped_passes_in_short",
@@ -402,6 +404,7 @@ _TARGETS = (
             f"{_CHECK}a_false_success_and_an_edited_status_fail",
             f"{_CHECK}a_number_of_the_reference_that_is_edited_is_seen",
             f"{_CHECK}a_reference_that_is_altered_or_not_there_fails",
+            "analysis/test_checks.py::test_the_growth_of_a_reference_is_that_of_its_samples",
             "runs/test_integrity.py::test_an_edit_behind_a_right_checksum_is_found",
         ),
         0.5,
