@@ -7,13 +7,14 @@ from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
 from support.defects import made_defects
 from support.references import reference
 from support.scenes import general, paper, shipped
-from support.stored import Arrays, Made, rotor, store
+from support.stored import Arrays, Made, damage, rotor, store
 
 from rotor_mbs.analysis import checks
 from rotor_mbs.analysis.judgement import bounds_of, defects_of, judge
@@ -277,6 +278,33 @@ def test_the_time_of_the_largest_defect_is_of_no_interval_where_all_are_rounding
     )
 
 
+@pytest.mark.parametrize("judged", [True, False], ids=["beyond rounding", "rounding alone"])
+@pytest.mark.parametrize(("share", "is_as_far"), [(0.9, True), (1.1, False)])
+def test_an_interval_is_as_far_as_the_worst_to_what_rounding_may_decide(
+    judged: bool, share: float, is_as_far: bool
+) -> None:
+    """The second, stored interval is smaller by a share of that: three units in which the samples
+    are rounded."""
+    floor, unit = 3e-6, 1e-6
+    larger = 1e-3 if judged else 1e-5
+    defects = made_defects(
+        [larger, larger - share * floor],
+        rounding=np.full((3, 2), 0.0 if judged else 1.0),
+    )
+    judgement: Any = SimpleNamespace(
+        defects=defects, metrics=defect_metrics(defects, 0.02) | {"defect_floor": unit}
+    )
+    assert bool(judgement.metrics["defect_judged"]) is judged
+    found = checks._of_stored_interval(stored(attributes={"defect_time": 0.02}), judgement)
+    assert found.get("defect_time") == (0.02 if is_as_far else None)
+
+
+def test_without_a_stored_interval_the_numbers_of_the_worst_one_are_compared() -> None:
+    defects = made_defects([2e-3, 1e-3])
+    judgement: Any = SimpleNamespace(defects=defects, metrics=defect_metrics(defects, 0.02))
+    assert checks._of_stored_interval(stored(), judgement) == {}
+
+
 def of_reference(own: Any, shipped: Any) -> dict[tuple[str, str], float]:
     scene: Any = SimpleNamespace(name="scene", reference=own)
     return values(checks._of_reference(scene, shipped, BOUNDS))
@@ -430,16 +458,38 @@ def test_an_early_end_is_excused_where_the_reference_ends_or_nothing_is_claimed(
 
 
 @pytest.mark.parametrize(
-    ("outputs", "passed"), [(("energy",), True), (("angles", "rates", "energy"), False)]
+    ("outputs", "false_success", "faults"),
+    [
+        (("energy",), 1, 0.0),
+        (("angles", "energy"), 1, 0.0),
+        (("rates", "energy"), 1, 0.0),
+        (("angles", "rates", "energy"), 1, 1.0),
+        (("energy",), 0, 1.0),  # the report of success is false, and is not called so
+    ],
 )
-def test_a_singularity_is_not_judged_without_angles(
-    outputs: tuple[str, ...], passed: bool, tmp_path: Path
+def test_a_singularity_is_not_judged_without_angles_or_rates(
+    outputs: tuple[str, ...], false_success: int, faults: float, tmp_path: Path
 ) -> None:
-    facts = {"status": "singular", "false_success": 1}
+    facts = {"status": "singular", "false_success": false_success}
     made = [Made(FIG11.replace(outputs=outputs), METHOD, rotor(np.sin), 0.5, attributes=facts)]
     with open_results(store(tmp_path / "r.h5", made)) as results:
         found = checks.checks_of(results, [], BOUNDS)
-    assert [check.passed for check in found if check.name == "status"] == [passed]
+    assert [check.value for check in found if check.name == "status"] == [faults]
+
+
+def test_an_error_in_a_damaged_run_is_its_own_and_in_an_intact_one_the_programs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = store(tmp_path / "r.h5", [Made(FIG11, METHOD, rotor(np.sin))])
+    monkeypatch.setattr(checks, "_of_run", Mock(side_effect=ZeroDivisionError("of the content")))
+    with open_results(path, verify=False) as results, pytest.raises(ZeroDivisionError):
+        checks.checks_of(results, [], BOUNDS)
+    damage(path, f"{FIG11.name}/{METHOD}", "angles")
+    with open_results(path, verify=False) as results:
+        found = {check.name: check for check in checks.checks_of(results, [], BOUNDS)}
+    assert not found["integrity"].passed
+    assert np.isnan(found["complete"].value)
+    assert "of the content" in found["complete"].hint
 
 
 @pytest.mark.parametrize(

@@ -31,6 +31,10 @@ EXPLAINED = {
     r"closed_form\.energies .*0\.0 \* sin_q": "a zero of the right kind of number",
     r"geometry\._turn .*2 \* rest scaled": "compares whole numbers",
     r"(geometry\.hub_body|mjcf\.model) .*0\.5 \* scene\.hub_inertia scaled": "the hub turns about y alone",
+    r"kinematics\._frames .*left side of zero \+ 1\.0 scaled": "a zero",
+    r"checks\._changed_metric .*0\.0 -> 500\.0": (
+        "without the excess of an interval no allowed defect is there to be compared"
+    ),
     r"geometry\._joined .*r @ r \* np\.eye": (
         "a fixed blade's centre of mass is on its own z: the product is zero"
     ),
