@@ -1,4 +1,4 @@
-"""Define named columns of numbers with units, the form in which all data are read."""
+"""Define the table of named columns, with units, to which all data are converted when read."""
 
 from __future__ import annotations
 
@@ -15,11 +15,14 @@ from numpy.typing import NDArray
 from rotor_mbs.comparison.units import is_unit, plain_unit, unit_of_attributes
 from rotor_mbs.errors import InputError, shown_value
 
-MAX_COLUMNS = 100_000  # of a file: wide results of a finite-element program have some thousands
-MAX_NAME = 200  # characters: longer names are cut, so that messages and pages stay readable
-_MAX_SHOWN = 12  # names that a message lists
-_MAX_SHOWN_NAME = 60  # characters of each
-_MAX_SHOWN_VALUE = 40  # characters of what is no number
+# Largest number of columns of a file. Wide results of a finite-element program have some thousands.
+MAX_COLUMNS = 100_000
+# Largest number of characters of a name. Longer names are cut, so that messages and pages stay
+# readable.
+MAX_NAME = 200
+_MAX_SHOWN = 12  # largest number of names that a message lists
+_MAX_SHOWN_NAME = 60  # largest number of characters of a name in such a list
+_MAX_SHOWN_VALUE = 40  # largest number of characters of a value that a message shows
 
 
 class DataColumn(NamedTuple):
@@ -27,11 +30,11 @@ class DataColumn(NamedTuple):
 
     Attributes
     ----------
-    values : (n,) as they stand in the file, NaN where one is missing.
-    unit : that the file states, "" where it states none.
-    step : between numbers that are packed as integers, in the same unit; 0 where they are not.
-    missing : what the file has in place of the first number that is missing, and where: "empty in
-        row 2 of 9 (line 3)"; "" if the file's text is not known.
+    values : (n,) numbers in the unit of the file, NaN for a missing number.
+    unit : the unit that the file states; "" if it states none.
+    step : step between the numbers, in the same unit, if they are packed as integers; otherwise 0.
+    missing : text for messages about the first missing number, with its row: "empty in row 2 of 9
+        (line 3)"; "" if no number is missing, or the text of the file is not known.
     """
 
     values: NDArray[np.float64]
@@ -41,12 +44,13 @@ class DataColumn(NamedTuple):
 
 
 class LeftOut(NamedTuple):
-    """Why something in a file is no column of numbers.
+    """The reason why a part of a file is not read as a column of numbers.
 
     Attributes
     ----------
-    reason : in words, "row 3 has 'x', no number".
-    is_column : whether it is a column all the same, and may have been meant to be a channel.
+    reason : the reason in words, "row 3 has 'x', no number".
+    is_column : whether the part is a column of values that are no numbers. Such a column may have
+        been intended as a channel; then it is refused.
     """
 
     reason: str
@@ -59,12 +63,12 @@ class DataTable:
 
     Attributes
     ----------
-    source : what messages call the file.
-    columns : by name, in the order of the file.
-    left_out : by name what else is in the file.
-    program : that wrote the file, as its head says: "openfast", or "".
-    headers : name in the file of each column that was renamed because an earlier one has the same
-        name.
+    source : name of the file in messages.
+    columns : the columns by name, in the order of the file.
+    left_out : the other parts of the file by name, each with the reason why it is no column.
+    program : "openfast" if the head of the file says that OpenFAST wrote it, otherwise "".
+    headers : original names, by the new name, of columns that were renamed because an earlier
+        column has the same name.
     """
 
     source: str
@@ -78,12 +82,13 @@ class DataTable:
 
         Parameters
         ----------
-        name : of the column, without its unit.
+        name : name of the column, without its unit.
 
         Raises
         ------
         InputError
-            If there is no such column, with the columns that there are; or if it has no numbers.
+            If there is no such column, or it is not a column of numbers. In the first case the
+            message lists the columns of the table.
         """
         if name in self.left_out:
             raise self.refusal(name)
@@ -94,7 +99,7 @@ class DataTable:
         return self.columns[name]
 
     def refusal(self, name: str) -> InputError:
-        """Return the error for a column that is needed and has no numbers."""
+        """Return the error for a column that is needed but is in `left_out`."""
         column = f"column {name!r}: {self.left_out[name].reason}"
         return InputError(f"{self.source}: {column}; allowed: real numbers, a row for every time")
 
@@ -102,18 +107,20 @@ class DataTable:
 def arrays_of(data: Any) -> tuple[dict[str, Any], dict[str, str]]:
     """Return arrays and their units by name from a mapping, a DataFrame or a Dataset.
 
-    Names of several levels are joined to a path; a unit in the last level is the array's unit. The
-    index of a DataFrame is a column, unless it counts the rows; an index without a name is the time
-    if it has durations or numbers that are not whole.
+    The levels of a column's name in a DataFrame are joined to a path; if the last level is a unit,
+    it becomes the array's unit. The index of a DataFrame becomes an array, unless it only counts
+    the rows. If an index has one level, no name, and durations or floating-point numbers, it is
+    named "time".
 
     Parameters
     ----------
-    data : mapping, pandas.DataFrame, or xarray.Dataset, whose coordinates are arrays too.
+    data : a mapping, a pandas.DataFrame, or an xarray.Dataset. The coordinates of a Dataset are
+        arrays, too.
 
     Returns
     -------
     dict, dict
-        Arrays by name; units by name, where there are any.
+        The arrays by name; the units by name, of the arrays that have one.
     """
     arrays: dict[str, Any] = {}
     units: dict[str, str] = {}
@@ -136,7 +143,7 @@ def arrays_of(data: Any) -> tuple[dict[str, Any], dict[str, str]]:
 
 
 def _joined(name: object) -> tuple[str, str]:
-    """Return name and unit of a column whose name may have several levels."""
+    """Return the name and unit of a column whose name may be a tuple of levels."""
     if not isinstance(name, tuple):
         return str(name), ""
     levels = [str(level).strip() for level in name]
@@ -152,19 +159,20 @@ def table_of(
     units: Mapping[str, str] | None = None,
     steps: Mapping[str, float] | None = None,
 ) -> DataTable:
-    """Return arrays by name as columns.
+    """Convert arrays by name to columns.
 
-    An array of two dimensions (n, k) becomes the columns `name[0]` ... `name[k-1]`, one of three
-    (n, j, k) the columns `name[0,0]` ... `name[j-1,k-1]`. An array (k, n) beside others of length n
-    is transposed: arrays of MATLAB have this form in HDF5. Values that are not numbers, single
-    numbers, and arrays of more dimensions are listed in `left_out`.
+    A two-dimensional array (n, k) becomes the columns `name[0]` ... `name[k-1]`; a
+    three-dimensional array (n, j, k) becomes the columns `name[0,0]` ... `name[j-1,k-1]`. An array
+    of shape (k, n) is transposed if there are one-dimensional arrays of length n: MATLAB's arrays
+    have this shape in HDF5. Values that are no numbers, single numbers, empty arrays, and arrays of
+    more dimensions are put into `left_out`.
 
     Parameters
     ----------
-    source : what messages call the data.
-    arrays : arrays, or what NumPy makes arrays of; masked values become NaN.
-    units : units by the name of the array; by default a unit in brackets behind the name.
-    steps : of packed arrays by name, see `DataColumn`.
+    source : name of the data in messages.
+    arrays : arrays, or values that NumPy converts to arrays; masked values become NaN.
+    units : units by the name of the array; by default the unit is read from the name.
+    steps : steps of packed arrays by name, see `DataColumn`.
 
     Raises
     ------
@@ -182,8 +190,9 @@ def table_of(
             continue
         if unit:
             stated[name] = unit
-    # A table of modes may have a single row, for one speed. Otherwise dimensions of length 1 come
-    # from MATLAB, whose arrays have two dimensions at least, and are removed.
+    # An array of shape (1,) shows that the data are a table of modes with a single row, for one
+    # speed; first dimensions of length 1 are then kept. Other dimensions of length 1 come from
+    # MATLAB, whose arrays have at least two dimensions; they are removed.
     is_single_row = any(values.shape == (1,) for values in numeric.values())
     for name, values in list(numeric.items()):
         squeezed = values if is_single_row and values.shape[:1] == (1,) else np.squeeze(values)
@@ -193,7 +202,7 @@ def table_of(
             reason = f"an array of {shape}" if squeezed.ndim or not squeezed.size else "one number"
             left_out[name] = LeftOut(reason)
             del numeric[name]
-    rows = 0  # largest length of the arrays of one dimension
+    rows = 0  # length of the longest one-dimensional array
     for values in numeric.values():
         if values.ndim == 1:
             rows = max(rows, values.size)
@@ -231,28 +240,30 @@ class _NotNumbersError(Exception):
 
 
 def _numbers(values: Any) -> tuple[NDArray[Any], str]:
-    """Return values as an array of numbers, NaN where one is missing, and the unit of durations.
+    """Convert values to an array of numbers, and return it with its unit if they are durations.
 
     Parameters
     ----------
-    values : an array, or anything of which NumPy makes one; masked values are missing.
+    values : an array, or values that NumPy converts to an array.
 
     Returns
     -------
     ndarray, str
-        Numbers, of the shape of `values`; "s" for durations, else "".
+        The numbers, of the shape of `values`, with NaN for masked and missing values; "s" for
+        durations, otherwise "".
 
     Raises
     ------
     _NotNumbersError
-        If a value is no number, with the row of the first; or if rows have different lengths.
+        If a value is no number, or rows have different lengths.
     """
     if np.ma.isMaskedArray(values):
         values = np.ma.filled(values.astype(float), np.nan)
     try:
         array = np.asarray(values)
         if array.dtype.kind in "US" and isinstance(values, list | tuple):
-            # Beside a text, NumPy converts numbers to texts: as objects they stay numbers.
+            # NumPy has converted the numbers of a list with a text to texts. In an array of
+            # objects they remain numbers.
             array = np.asarray(values, object)
     except (ValueError, TypeError) as exc:
         raise _NotNumbersError("rows of different lengths", is_column=True) from exc
@@ -274,7 +285,7 @@ def _numbers(values: Any) -> tuple[NDArray[Any], str]:
 
 
 def _numbers_of_objects(array: NDArray[Any]) -> NDArray[np.float64]:
-    """Return the numbers in an array of objects, NaN for None and pandas' missing values.
+    """Convert an array of objects to numbers, with NaN for None and pandas' missing values.
 
     Parameters
     ----------
@@ -283,12 +294,12 @@ def _numbers_of_objects(array: NDArray[Any]) -> NDArray[np.float64]:
     Raises
     ------
     _NotNumbersError
-        If an object is no number, with the row of the first.
+        If an object is no number; the message names the row of the first such object.
     """
     numbers = np.empty(array.size)
     width = math.prod(array.shape[1:]) or 1
     for i, value in enumerate(array.flat):
-        # pandas.NA and NaT are of types that NumPy does not know.
+        # pandas.NA and NaT are missing values, but their types are no number types.
         if value is None or type(value).__name__ in ("NAType", "NaTType"):
             numbers[i] = np.nan
             continue
@@ -300,26 +311,28 @@ def _numbers_of_objects(array: NDArray[Any]) -> NDArray[np.float64]:
             raise _NotNumbersError(reason, is_column=array.ndim > 0 and not isinstance(value, dict))
         try:
             numbers[i] = float(value)
-        except OverflowError:  # a whole number of more than 308 digits
+        except OverflowError:  # an integer of more than 308 digits
             numbers[i] = np.inf
     return numbers.reshape(array.shape)
 
 
 def _shown_value(row: int, value: object) -> str:
-    """Return "row 3 has 'x', no number"."""
+    """Return a text that shows a value that is no number: "row 3 has 'x', no number"."""
     text = value.decode("latin-1") if isinstance(value, bytes) else str(value)
     return f"row {row} has {text[:_MAX_SHOWN_VALUE]!a}, no number"
 
 
 def split_bracketed_unit(name: str) -> tuple[str, str]:
-    """Return name and unit of "rotor [deg]", "rotor / deg" or "rotor in deg"; "" for no unit.
+    """Split a column's name into name and unit; the unit is "" if there is none.
 
-    Numbers in brackets are indices. Round brackets directly behind a word are those of a function
-    if the word is "der" or the text in them is no unit: "q[1,1]" and "der(phi)" have no unit.
+    The recognized forms are "rotor [deg]", "rotor (deg)", "rotor / deg", "rotor in deg" and
+    "rotor, deg". Numbers in brackets are indices, not a unit: "q[1,1]". Round brackets directly
+    after a word enclose the argument of a function if the word is "der" or their content is no
+    unit: "der(phi)".
 
     Parameters
     ----------
-    name : of a column, of any length: the time that it takes is linear in the length.
+    name : name of a column, of any length: the computing time is proportional to the length.
 
     >>> split_bracketed_unit("rotor [deg]"), split_bracketed_unit("t / s")
     (('rotor', 'deg'), ('t', 's'))
@@ -342,7 +355,14 @@ def split_bracketed_unit(name: str) -> tuple[str, str]:
 
 
 def _is_argument(text: str, end: int, stem: str, unit: str) -> bool:
-    """Return whether the brackets at `end` hold an index or the argument of a function."""
+    """Return whether a supposed unit is an index, or the argument of a function.
+
+    Parameters
+    ----------
+    text : a column's name.
+    end : position in `text` at which the bracket or stroke before the supposed unit begins.
+    stem, unit : the text before this position, and the supposed unit.
+    """
     if unit and all(character.isdigit() or character in ", " for character in unit):
         return True
     if text[end] != "(" or text[end - 1].isspace():
@@ -351,7 +371,14 @@ def _is_argument(text: str, end: int, stem: str, unit: str) -> bool:
 
 
 def _bracketed(text: str) -> tuple[int, str] | None:
-    """Return where the last brackets of a name open, if it ends with them, and what is in them."""
+    """Find brackets at the end of a name.
+
+    Returns
+    -------
+    (int, str) or None
+        The position of the opening bracket, and the text in the brackets; None if the name does not
+        end with brackets.
+    """
     if not text.endswith(("]", ")")):
         return None
     inner = text[:-1]
@@ -364,7 +391,13 @@ def _bracketed(text: str) -> tuple[int, str] | None:
 
 
 def _behind_stroke(text: str) -> tuple[int, str] | None:
-    """Return where " / unit" or " /unit" begins at the end of a name, and the unit."""
+    """Find " / unit" or " /unit" at the end of a name.
+
+    Returns
+    -------
+    (int, str) or None
+        The position at which it begins, and the unit; None if the name does not end so.
+    """
     words = text.rsplit(maxsplit=2)
     if len(words) == 3 and words[1] == "/":
         return len(words[0]), words[2]
@@ -374,7 +407,7 @@ def _behind_stroke(text: str) -> tuple[int, str] | None:
 
 
 def shown_names(names: Sequence[str]) -> str:
-    """Return a list of names for a message: the first ones, and how many there are."""
+    """Return a list of names for a message; a long list is cut and ends with their number."""
     shown = []
     for name in names[:_MAX_SHOWN]:
         text = name if len(name) <= _MAX_SHOWN_NAME else f"{name[:_MAX_SHOWN_NAME]}..."

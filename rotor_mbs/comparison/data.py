@@ -1,7 +1,7 @@
-"""Load data of a scene in SI units from files or arrays, with the rounding of each number.
+"""Load data of a scene in SI units from files or arrays, and find the rounding of each number.
 
-Data that cannot be compared are refused here: numbers that are not finite, columns of different
-lengths, rows that contradict each other.
+Data are refused here if they cannot be compared: if numbers are not finite, columns have different
+lengths, or rows contradict each other.
 """
 
 from __future__ import annotations
@@ -27,14 +27,22 @@ from rotor_mbs.scenario.keys import counted
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.trajectory import Array
 
+# Numbers of significant digits. Up to _FEW_DIGITS, numbers are tested by arithmetic; for more, they
+# are formatted as text. Up to _SURE_DIGITS, numbers may differ from their text by _ROUNDED_SINCE;
+# for more digits, nearly all numbers would fit with this tolerance. All doubles fit _ALL_DIGITS.
 _FEW_DIGITS, _SURE_DIGITS, _ALL_DIGITS = 9, 14, 17
-_MAX_WRITTEN = 20_000  # numbers of a column, evenly chosen, that are formatted as text: 1 us each
-_ROUNDED_SINCE = 2.0 * 2.0**-52  # relative error of a conversion of units after the rounding
-_SINGLE_DIGITS = 8  # as many as single precision has
-_SINGLE = 2.0**-24  # its relative rounding error
-_MAX_EXCEPTIONS = 0.05  # of the numbers
-_MIN_DISTINCT = 10  # values: fewer may be input, such as 0.5, that says nothing of the digits
-_SAMPLE = 200  # about as many numbers of a column are used where not all are needed
+# At most about this many numbers of a column, evenly spaced, are formatted as text: 1 us each.
+_MAX_WRITTEN = 20_000
+_ROUNDED_SINCE = 2.0 * 2.0**-52  # relative error of a unit conversion that follows the rounding
+_SINGLE_DIGITS = 8  # number of significant digits of single precision
+_SINGLE = 2.0**-24  # relative rounding error of single precision
+# Largest share of numbers with a coarser rounding in a column that is said to have a fixed number
+# of decimals.
+_MAX_EXCEPTIONS = 0.05
+# Columns with fewer distinct values than this do not show their digits: the values may be input,
+# such as 0.5.
+_MIN_DISTINCT = 10
+_SAMPLE = 200  # about this many numbers of a column are used where a sample is enough
 
 
 @dataclass(frozen=True)
@@ -43,24 +51,25 @@ class ForeignData:
 
     Attributes
     ----------
-    source : what messages call the data.
-    time, values : (n,) s, increasing from 0 or later; (n, channels) in SI units. A table of modes
-        has the speeds, rad/s, in place of the times.
-    channels : of the columns of `values`.
-    rounding, time_rounding : (n, channels), (n,) half a unit in the last digit of each number, as
-        it was written.
+    source : name of the data in messages.
+    time, values : (n,) s, increasing from 0 or later; (n, channels) in SI units. In a table of
+        modes, `time` has the speeds, rad/s.
+    channels : the channel of each column of `values`.
+    rounding, time_rounding : (n, channels), (n,) half a unit in the last written digit of each
+        number, in SI units. Times with equal intervals have only the rounding of double precision.
     read : a line for each channel: column, unit, and what was assumed.
-    unused : by name of every other column, why it is not compared.
-    loads_left_out : names of the loads among the unused columns that the mapping does not omit.
-    wrapped : for each channel, whether whole turns are missing from it.
-    precision : "4 decimals: rounding error 5e-05", or a number of digits in this form; "" if the
-        numbers have hardly any rounding.
-    time_precision : the same of the times; "" also if their intervals are equal, but for a few.
-    notes : what was done to the rows.
-    omitted : names of channels that the mapping omits: data without them are complete.
-    restricted_to : names of the channels to which the mapping restricts the comparison; empty where
-        it does not.
-    is_modes : whether it is a table of modes.
+    unused : for every other column, by its name, the reason why it is not compared.
+    loads_left_out : names of the loads that are in unused columns although the mapping does not
+        omit them.
+    wrapped : for each channel, whether the file has the angle without its whole turns.
+    precision : precision of the numbers in words: "4 decimals: rounding error 5e-05", or the same
+        with a number of digits; "" if the numbers have hardly any rounding.
+    time_precision : precision of the times in words; "" also if nearly all intervals are equal.
+    notes : what was done to the rows, a line each.
+    omitted : names of the channels that the mapping omits: the data need not have them.
+    restricted_to : names of the channels to which the mapping restricts the comparison; empty if
+        there is no restriction.
+    is_modes : whether the data are a table of modes.
     """
 
     source: str
@@ -91,7 +100,12 @@ class ForeignData:
         )
 
     def only(self, *, loads: bool) -> ForeignData:
-        """Return the data with the channels of loads alone, or with all others."""
+        """Return the data with the load channels only, or with the other channels only.
+
+        Parameters
+        ----------
+        loads : whether the load channels are kept.
+        """
         chosen = [j for j, channel in enumerate(self.channels) if channel.is_load == loads]
         return replace(
             self,
@@ -102,7 +116,12 @@ class ForeignData:
         )
 
     def beside(self, other: ForeignData) -> ForeignData:
-        """Return the data followed by the channels of `other`, which has the same rows."""
+        """Return data with the channels of this object and those of `other`.
+
+        Parameters
+        ----------
+        other : data with the same rows.
+        """
         return replace(
             self,
             channels=self.channels + other.channels,
@@ -113,7 +132,7 @@ class ForeignData:
 
     @property
     def columns(self) -> list[int]:
-        """Return the places of the channels in a matrix of all angles, then rates, then loads."""
+        """Return the index of each channel among all channels of the scene, see `Channel`."""
         return [channel.column for channel in self.channels]
 
 
@@ -126,11 +145,11 @@ def load_data(
 
     Parameters
     ----------
-    data : a file; or arrays by name, an xarray.Dataset, whose coordinates are arrays too, or a
-        pandas.DataFrame.
-    scene : the scene that the data are of.
-    columns : a mapping file, or a mapping of its keys; by default channels are recognized by the
-        names of columns.
+    data : path of a file, a mapping of arrays by name, a pandas.DataFrame, or an xarray.Dataset.
+        The coordinates of a Dataset are arrays, too.
+    scene : the scene with which the data are to be compared.
+    columns : path of a mapping file, or a dict with the keys of such a file; by default channels
+        are recognized by the names of columns.
 
     Raises
     ------
@@ -151,17 +170,17 @@ def load_data(
     return data_of_table(table, scene, mapping)
 
 
-@np.errstate(all="ignore")  # numbers of data may be so large that they overflow
+@np.errstate(all="ignore")  # numbers in the data may be so large that the arithmetic overflows
 def data_of_table(
     table: DataTable, scene: Scene, mapping: DataMapping | None = None
 ) -> ForeignData:
-    """Take the channels of a scene from named columns, in SI units.
+    """Return the channels of a scene that are found in named columns, in SI units.
 
     Parameters
     ----------
     table : named columns of numbers.
     scene : the scene whose channels the columns may be.
-    mapping : which column is which; by default they are recognized by their names.
+    mapping : the channels of columns; by default channels are recognized by the names of columns.
 
     Raises
     ------
@@ -222,12 +241,15 @@ def data_of_table(
 
 
 def _factor(channel: Channel, source: ColumnMapping) -> float:
-    """Return the factor to the SI unit from a column's unit, which fits the channel."""
+    """Return the factor from a column's unit to the channel's SI unit.
+
+    `find_channels` has already refused units that do not fit the channel.
+    """
     return unit_factor(source.unit, channel.kind) or 1.0
 
 
 def _refuse_different_lengths(table: DataTable, sources: Mapping[Channel, ColumnMapping]) -> None:
-    """Raise InputError unless all channels have a row for every time."""
+    """Raise InputError if the columns of the channels have different lengths."""
     lengths = {}
     for source in sources.values():
         lengths[source.column] = len(table[source.column].values)
@@ -246,13 +268,13 @@ def _si_values(table: DataTable, channel: Channel, source: ColumnMapping) -> Arr
     Parameters
     ----------
     table : the columns of the data.
-    channel : what the column is.
-    source : the column, its unit, sign and offset.
+    channel : the channel.
+    source : the name of its column, with unit, sign and offset.
 
     Raises
     ------
     InputError
-        If a number is not finite, with its row.
+        If a number is not finite; the message names the row.
     """
     values = table[source.column].values
     factor = _factor(channel, source)
@@ -278,24 +300,25 @@ def _jump_times(scene: Scene) -> list[float]:
     return times
 
 
-# Rounding: data are judged by the digits with which they were written
+# Rounding: it is found from the digits with which the numbers were written
 
 
 def _rounding_of_columns(
     sources: Mapping[Channel, ColumnMapping], columns: Sequence[Array], steps: Sequence[float]
 ) -> tuple[list[Array], str]:
-    """Find the rounding of the numbers of all columns.
+    """Find the rounding of the numbers of all columns, and their precision in words.
 
     Parameters
     ----------
-    sources : by channel its column and unit, the time or speed first.
+    sources : the column and unit of each channel, the time or speed first.
     columns : (n,) numbers of each channel, as they were written.
-    steps : between packed numbers of each channel, see `DataColumn`.
+    steps : for each channel, the step between its numbers if they are packed, see `DataColumn`.
 
     Returns
     -------
     list of ndarray, str
-        Half a unit in the last digit of each number, in SI units; `ForeignData.precision`.
+        For each channel, half a unit in the last digit of each number, in SI units; the text
+        `ForeignData.precision`.
     """
     time, *numbers = columns
     factors = []
@@ -303,15 +326,16 @@ def _rounding_of_columns(
     for channel, source in sources.items():
         factors.append(_factor(channel, source))
         kinds.append((channel.kind, source.unit))
-    del kinds[0]  # of the time
+    del kinds[0]  # the kind of the time or speed
     rounding = [rounding_of_printed(time)]
-    # Columns of one kind and unit are written alike: one that hardly changes has their digits.
+    # Columns of one kind and unit are written with the same digits. A column that hardly changes
+    # does not show its digits; they are then found from the other columns of its kind and unit.
     for kind, values in zip(kinds, numbers, strict=True):
         alike = []
         for other_kind, other in zip(kinds, numbers, strict=True):
             if other_kind == kind:
                 alike.append(other)
-        # Frequencies are computed, not chosen: few of them say something of digits, too.
+        # Frequencies are computed, not input: even a few of them show their digits.
         min_distinct = 1 if kind[0] == "frequency" else _MIN_DISTINCT
         rounding.append(rounding_of_printed(values, [alike, numbers], min_distinct))
     rounding = [np.maximum(last, 0.5 * step) for last, step in zip(rounding, steps, strict=True)]
@@ -323,23 +347,24 @@ def _rounding_of_columns(
 def rounding_of_printed(
     values: Array, others: Sequence[Sequence[Array]] = (), min_distinct: int = _MIN_DISTINCT
 ) -> Array:
-    """Find half a unit in the last place of numbers as they were written.
+    """Find the rounding of written numbers: half a unit in the last place of each.
 
-    They may have been written with some decimals, some significant digits, or in single or double
-    precision: the coarsest way that fits all of them is taken.
+    The numbers may have been written with a fixed number of decimals, a fixed number of significant
+    digits, or in single or double precision. The coarsest of these forms that fits all numbers is
+    taken.
 
     Parameters
     ----------
     values : (n,) numbers of a column.
-    others : groups of columns; a column of few distinct values is judged together with the first
-        group that has enough.
-    min_distinct : numbers with fewer distinct values than this are taken to be exact, to double
-        precision.
+    others : groups of columns. If `values` has few distinct numbers, the rounding is found from
+        `values` and the first group together; if these are too few again, the next group is used.
+    min_distinct : if there are fewer distinct numbers than this, the numbers are taken as exact to
+        double precision.
 
     Returns
     -------
     ndarray
-        (n,) in the unit of the numbers.
+        (n,) the rounding, in the unit of the numbers.
     """
     sizes, judged = np.abs(values), values
     for group in others:
@@ -349,13 +374,13 @@ def rounding_of_printed(
     largest = float(np.abs(judged).max(initial=0.0))
     if len(np.unique(judged)) < min_distinct:
         return np.asarray(sizes * 2.0**-53)
-    # Numbers with a fixed number of decimals may seem to have a fixed number of digits, and the
-    # other way round: both are tried, and the coarser rounding is taken.
+    # Numbers with a fixed number of decimals may seem to have a fixed number of digits, and vice
+    # versa. Both forms are therefore tried, and the coarser rounding is taken.
     last = np.zeros(len(values))
-    noise = 4.0 * 2.0**-52 * largest  # errors of the arithmetic below
+    noise = 4.0 * 2.0**-52 * largest  # error of the arithmetic below
     for decimals in range(_SURE_DIGITS + 1):
         unit = 10.0**-decimals
-        # Any number fits a unit that is not far above the errors of the arithmetic.
+        # Units near the error of the arithmetic are skipped: any number fits them.
         if not 100.0 * noise < unit < largest:
             continue
         rounded = np.round(judged / unit) * unit
@@ -367,9 +392,10 @@ def rounding_of_printed(
         exponents = np.floor(np.log10(np.where(sizes > 0.0, sizes, 1.0)))
         units = 0.5 * 10.0 ** (exponents + 1 - digits)
         last = np.maximum(last, np.where(sizes > 0.0, units, 0.0))
-    # Numbers of single precision may also seem to have 16 digits. All doubles from 0.5 to 1 do: the
-    # gaps between them are wider than those between numbers of 16 digits.
-    with np.errstate(over="ignore"):  # of what is larger than single precision can be
+    # Single precision is tested last, because numbers of single precision may seem to have 16
+    # digits. All doubles from 0.5 to 1 seem to have 16 digits: the gaps between these doubles are
+    # wider than the gaps between numbers of 16 digits.
+    with np.errstate(over="ignore"):  # large doubles overflow in single precision
         single = np.asarray(judged, np.float32).astype(float)
     if np.array_equal(single, judged):
         return np.maximum(last, sizes * _SINGLE)
@@ -382,10 +408,10 @@ def _precision(columns: Sequence[Array], rounding: Sequence[Array]) -> str:
     Parameters
     ----------
     columns : (n,) numbers of each column, as they were written.
-    rounding : `rounding_of_printed` of each.
+    rounding : (n,) rounding of each column, by `rounding_of_printed`.
     """
     rounded = []
-    digits = 0  # of the rounded columns: others may have all digits
+    digits = 0  # largest number of digits of the rounded columns; the other columns may have all
     for values, last in zip(columns, rounding, strict=True):
         sizes = np.abs(values)
         if (last > 10.0**-_FEW_DIGITS * sizes).any():
@@ -393,7 +419,7 @@ def _precision(columns: Sequence[Array], rounding: Sequence[Array]) -> str:
             digits = max(digits, _significant_digits(values))
     if not rounded:
         return ""
-    # A column of zeros has no digits.
+    # Columns of zeros are not counted: they have no digits.
     count = sum(bool(np.any(values)) for values in columns)
     where = "" if len(rounded) >= count else f" in {len(rounded)} of {count} columns"
     if digits >= _SINGLE_DIGITS:
@@ -401,8 +427,8 @@ def _precision(columns: Sequence[Array], rounding: Sequence[Array]) -> str:
             if sizes.any() and (last == sizes * _SINGLE).all():
                 return f"single precision{where}: relative rounding error {_SINGLE:.0e}"
         return ""
-    # Digits and decimals are the same for numbers of one size; they are named as decimals only if
-    # sizes differ and nearly all numbers have the same rounding.
+    # For numbers of one magnitude, a number of digits is also a number of decimals. The text says
+    # "decimals" only if magnitudes differ and nearly all numbers have the same rounding.
     is_fixed = any(sizes.min() < 0.1 * sizes.max() for sizes, _ in rounded)
     exceptions = [(last > 2.0 * last.min()).mean() for _, last in rounded]
     if is_fixed and max(exceptions) < _MAX_EXCEPTIONS:
@@ -417,9 +443,10 @@ def _time_precision(time: Array, rounding: Array, *, is_equidistant: bool) -> st
 
     Parameters
     ----------
-    time, rounding : (n,) as they were written, in the unit of the file.
-    is_equidistant : whether the intervals are equal, or equal but for a few; then the digits of the
-        times do not matter.
+    time : (n,) times as they were written, in the unit of the file.
+    rounding : (n,) their rounding, s.
+    is_equidistant : whether nearly all intervals are equal; then the digits of the times do not
+        matter.
     """
     if is_equidistant:
         return ""
@@ -430,32 +457,33 @@ def _time_precision(time: Array, rounding: Array, *, is_equidistant: bool) -> st
 
 
 def _significant_digits(values: Array) -> int:
-    """Find the least number of significant digits that all numbers fit, up to 17."""
+    """Return the smallest number of significant digits, up to 17, that represents all numbers."""
     nonzero = values[values != 0.0]
     if not np.isfinite(nonzero).all():
         return _ALL_DIGITS
     for digits in range(1, _ALL_DIGITS):
-        # A few values refute most numbers of digits, which saves the time for all of them.
+        # The first values rule out most numbers of digits; that saves a test of all values.
         if _have_digits(nonzero[:_SAMPLE], digits) and _have_digits(nonzero, digits):
             return digits
     return _ALL_DIGITS
 
 
 def _have_digits(values: Array, digits: int) -> bool:
-    """Return whether numbers may have been written with so many significant digits.
+    """Return whether numbers may have been written with a given number of significant digits.
 
     Parameters
     ----------
-    values : (n,) finite numbers, none of them 0.
+    values : (n,) finite numbers other than 0.
     digits : number of significant digits.
     """
     if digits <= _FEW_DIGITS:
-        with np.errstate(all="ignore"):  # the unit of the smallest numbers may be 0: none fit
+        # For the smallest doubles, the unit may be 0; these numbers then fit no number of digits.
+        with np.errstate(all="ignore"):
             unit = 10.0 ** (np.floor(np.log10(np.abs(values))) + 1 - digits)
             rounded = np.round(values / unit) * unit
         return np.allclose(values, rounded, rtol=1e-12, atol=0.0)
-    # Beyond that the arithmetic above is too coarse: numbers are written as texts and compared. A
-    # number may have been multiplied by a factor of units since it was rounded.
+    # For more digits the arithmetic above is too coarse. The numbers are formatted as text and
+    # compared with the text. After the rounding, a number may have been converted to another unit.
     most = _ROUNDED_SINCE if digits <= _SURE_DIGITS else 0.0
     for value in values[:: 1 + len(values) // _MAX_WRITTEN].tolist():
         written = float(f"{value:.{digits - 1}e}")

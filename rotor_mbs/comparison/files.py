@@ -1,8 +1,8 @@
-"""Read a file of another program as columns, in a process of its own with limits.
+"""Read a file of another program as columns, in a worker process with limits.
 
-What a file holds is decided by others: it may be damaged, or made to harm. Every format is read in
-another process. If reading ends that process, takes too long or fills its memory, the caller gets
-an error of one line.
+A file of another program may be damaged or malicious. Files of all formats are therefore read in a
+worker process. If that process dies, takes too long or needs too much memory, the caller gets an
+error of one line.
 """
 
 from __future__ import annotations
@@ -15,8 +15,9 @@ from rotor_mbs.comparison.formats import FORMATS, MAX_BYTES, read_in_worker
 from rotor_mbs.errors import InputError
 from rotor_mbs.processes.worker import TaskLostError, Worker
 
-TIME_LIMIT_S = 120.0  # for reading a file; text of MAX_BYTES takes some 40 s
-# Bytes of address space: text of MAX_BYTES takes half of it, with its arrays.
+TIME_LIMIT_S = 120.0  # time limit for reading a file; a text file of MAX_BYTES takes some 40 s
+# Limit of the worker's address space, in bytes. Reading a text file of MAX_BYTES takes half of it,
+# including the arrays of its numbers.
 MEMORY_LIMIT = 1 << 32
 
 
@@ -25,15 +26,17 @@ def read_table(path: str | os.PathLike[str], group: str = "", scene: str = "") -
 
     Parameters
     ----------
-    path : the file; its format is recognized by its first bytes, that of `.outb` by its ending.
-    group, scene : of an HDF5 file, see `runs.arrays.read_arrays`.
+    path : the file. The format is recognized by the first bytes of the file; OpenFAST's binary
+        output is recognized by its ending `.outb`.
+    group, scene : the group of an HDF5 file that is read, and the name of a scene whose groups are
+        preferred, see `runs.arrays.read_arrays`.
 
     Raises
     ------
     InputError
-        If the file cannot be read within `TIME_LIMIT_S` and `MEMORY_LIMIT`, in one line.
+        If the file cannot be read within `TIME_LIMIT_S` and `MEMORY_LIMIT`.
     ResourceError
-        If the reading process cannot be started.
+        If the worker process cannot be started.
     """
     path = Path(path)
     if not path.is_file():
@@ -49,7 +52,7 @@ def read_table(path: str | os.PathLike[str], group: str = "", scene: str = "") -
         path.open("rb").close()
     except OSError as exc:
         raise InputError(f"{path}: cannot be read: {exc.strerror}") from exc
-    # Whatever libraries print is dropped: it may be of any size.
+    # The worker discards what the libraries print, as the amount of it is not limited.
     with Worker(memory_limit=MEMORY_LIMIT, is_silent=True) as worker:
         try:
             return worker.run(read_in_worker, (path, group, scene), TIME_LIMIT_S)

@@ -1,7 +1,8 @@
-"""Order the rows of a motion by their times, and find the rounding of the times.
+"""Order the rows of a trajectory by their times, and find the rounding of the times.
 
-Programs write a row twice at an event, rows of an initialisation before t = 0, rows from the end to
-the start. Repeated rows are dropped; rows that contradict each other are refused.
+Some programs write a row twice at an event, some write rows of an initialisation before t = 0, and
+some write the rows from the end to the start. Rows that repeat another row are dropped. Data with
+different rows at one time are refused.
 """
 
 from __future__ import annotations
@@ -18,13 +19,14 @@ from rotor_mbs.scenario.keys import counted
 from rotor_mbs.scenario.time_table import ALIGNMENT
 from rotor_mbs.solution.trajectory import Array
 
-_NEAR_ZERO = 1e-9  # of an interval: a time that is nearer to 0 is taken as 0
-_SAME_STATE = 1e-9  # absolute or relative: difference of the same state computed twice
-_EQUAL = 1e-6  # of an interval between rows
-_MOSTLY = 0.9  # of the intervals
-_STEP_DIGITS = 12  # of a step that was chosen
-_ROUNDOFF = 2.0**-53
-_MIN_ROWS = 3  # fewer have no motion to be compared
+_NEAR_ZERO = 1e-9  # a time whose distance from 0 is at most this share of an interval is taken as 0
+# Largest difference, absolute or relative, of two rows that are taken as one state computed twice.
+_SAME_STATE = 1e-9
+_EQUAL = 1e-6  # relative: intervals that differ by no more than this are taken as equal
+_MOSTLY = 0.9  # smallest share of equal intervals with which a few others are taken as mistakes
+_STEP_DIGITS = 12  # largest number of significant digits of a step that a user has chosen
+_ROUNDOFF = 2.0**-53  # relative rounding error of double precision
+_MIN_ROWS = 3  # smallest number of rows that are compared as a motion
 
 
 class OrderedRows(NamedTuple):
@@ -32,9 +34,9 @@ class OrderedRows(NamedTuple):
 
     Attributes
     ----------
-    places : (n,) numbers of the rows in the data, in the order of their times.
-    time : (n,) s, increasing from 0 or later.
-    notes : what was done to the rows, a line each.
+    places : (n,) indices of these rows in the data, in the order of their times.
+    time : (n,) times of these rows, s, increasing from 0 or later.
+    notes : what was done to the rows of the data, a line each.
     """
 
     places: NDArray[np.int64]
@@ -45,21 +47,21 @@ class OrderedRows(NamedTuple):
 def ordered_rows(
     source: str, time: Array, motion: Array, others: Array, jumps: Sequence[float]
 ) -> OrderedRows:
-    """Order rows by their times, one row for each time, from t = 0 on.
+    """Order rows by their times, and keep one row for each time from t = 0 on.
 
     Parameters
     ----------
-    source : what messages call the data.
-    time : (n,) s, in the order of the data.
+    source : name of the data in messages.
+    time : (n,) times, s, in the order of the data.
     motion : (n, channels) angles and rates, rad and rad/s.
     others : (n, channels) loads, N and N m.
-    jumps : s, times at which a load of the scene jumps.
+    jumps : times, s, at which a load of the scene jumps.
 
     Raises
     ------
     InputError
-        If two different rows have one time, unless a load jumps there and they have the same
-        motion; or if fewer than three rows are left.
+        If two rows at one time differ, unless only their loads differ and a load of the scene jumps
+        at this time; or if fewer than three rows are left.
     """
     notes = []
     if len(time) < _MIN_ROWS:
@@ -71,8 +73,9 @@ def ordered_rows(
     if (np.diff(time) < 0.0).any():
         is_descending = bool((np.diff(time) <= 0.0).all())
         if is_descending:
-            # At a jump of a load, a descending file has the row after the jump first. The sort
-            # keeps the order of rows of one time, so the rows are reversed before it.
+            # A file with descending times has the row after a jump of a load before the row before
+            # the jump. Sorting keeps the order of rows with equal times, so the rows are reversed
+            # before they are sorted.
             places = places[::-1]
         places = places[np.argsort(time[places], kind="stable")]
         was = "from the end to the start" if is_descending else "not in the order of their times"
@@ -120,17 +123,24 @@ def ordered_rows(
 
 
 def _are_same(first: Array, second: Array, tolerance: float) -> bool:
-    """Return whether two rows are equal to a tolerance, relative for numbers larger than 1."""
+    """Return whether two rows are equal within a tolerance.
+
+    Parameters
+    ----------
+    first, second : (channels,) numbers of the rows.
+    tolerance : largest difference; it is relative for numbers above 1, and absolute for others.
+    """
     scale = np.maximum(np.maximum(np.abs(first), np.abs(second)), 1.0)
     return bool((np.abs(first - second) <= tolerance * scale).all())
 
 
 def rounding_of_steps(time: Array) -> Array | None:
-    """Find the rounding of times whose intervals are equal, or equal but for a few.
+    """Find the rounding of times whose intervals are nearly all equal.
 
-    Equal intervals are taken as exact, though the times have few digits; a few that differ are
-    mistakes in the times. Times that are sums of a step are off by the rounding of the additions,
-    which no single time shows.
+    Times with equal intervals are taken as exact to double precision, even if they have few digits.
+    If a few intervals differ from the others, they are taken as mistakes in the times, not as
+    rounding. A program may compute its times by adding a step repeatedly. Their rounding is then
+    that of the additions, and the digits of a time do not show it.
 
     Parameters
     ----------
@@ -139,7 +149,7 @@ def rounding_of_steps(time: Array) -> Array | None:
     Returns
     -------
     ndarray or None
-        (n,) s; None for times whose intervals are not equal.
+        (n,) the rounding of each time, s; None if too few intervals are equal.
     """
     intervals = np.diff(time)
     usual = float(np.median(intervals))
@@ -154,8 +164,9 @@ def rounding_of_steps(time: Array) -> Array | None:
     from_line = np.abs(time - (time[0] + mean * rows))
     if from_line.max() <= 4.0 * _ROUNDOFF * np.abs(time).max():
         return rounding
-    # Otherwise the times are sums of a chosen step: the mean interval, rounded to some digits. The
-    # additions make them differ from multiples of this step; a larger difference is no rounding.
+    # The times are now taken as sums of a chosen step, which is the mean interval rounded to
+    # _STEP_DIGITS digits. The rounding of the additions makes the sums differ from multiples of the
+    # step. A difference larger than n roundings in row n is not explained by the additions.
     digits = _STEP_DIGITS - 1 - math.floor(math.log10(mean))
     from_chosen = np.abs(time - (time[0] + round(mean, digits) * rows))
     return np.asarray(rounding + np.minimum(from_chosen, rows * rounding))

@@ -1,7 +1,7 @@
-"""Units in any usual spelling: `rad s^-1`, `radian/second`, `kN·m`, `[deg]`.
+"""Read units in any usual spelling: `rad s^-1`, `radian/second`, `kN·m`, `[deg]`.
 
-A unit is a product of atoms with whole exponents. Its factor to the SI unit is known where it has
-the dimension of a channel.
+A unit is a product of atoms, such as `kN` and `m`, with integer exponents. `unit_factor` returns
+the factor to the SI unit if the unit has the dimension of the channel.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import re
 from collections.abc import Mapping
 
 _RADIAN, _DEGREE, _TURN = 1.0, math.pi / 180.0, 2.0 * math.pi
-# Exponents of time, angle, force and length; factor to SI units.
+# An atom: its exponents of time, angle, force and length, and its factor to SI units.
 _Atom = tuple[tuple[int, int, int, int], float]
 _TIME, _ANGLE, _FORCE, _LENGTH = (1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1)
 _PER_TIME, _RATE, _MOMENT = (-1, 0, 0, 0), (-1, 1, 0, 0), (0, 0, 1, 1)
@@ -20,7 +20,10 @@ _PER_TIME, _RATE, _MOMENT = (-1, 0, 0, 0), (-1, 1, 0, 0), (0, 0, 1, 1)
 def _spelled(dimension: tuple[int, int, int, int], **names: float) -> dict[str, _Atom]:
     """Return atoms of one dimension by their spellings.
 
-    A keyword has spellings joined by "_"; its value is their factor.
+    Parameters
+    ----------
+    dimension : exponents of time, angle, force and length.
+    names : factors to SI units. Each keyword is a list of spellings of one atom, joined by "_".
     """
     atoms = {}
     for spellings, factor in names.items():
@@ -29,7 +32,7 @@ def _spelled(dimension: tuple[int, int, int, int], **names: float) -> dict[str, 
     return atoms
 
 
-# By spelling in lower case.
+# Atoms by their spelling in lower case.
 _ATOMS: dict[str, _Atom] = {
     **_spelled(_TIME, s_sec_secs_second_seconds_sekunde_sekunden=1.0, min_minute_minutes=60.0),
     **_spelled(_TIME, h_hr_hour_hours=3600.0, ms_msec_millisecond_milliseconds=1e-3),
@@ -46,13 +49,14 @@ _ATOMS: dict[str, _Atom] = {
     **_spelled(_LENGTH, m_meter_meters_metre_metres=1.0, mm=1e-3, cm=1e-2, km=1e3),
     **_spelled(_MOMENT, nm=1.0, knm=1e3),
 }
-# Spellings in which the case decides.
+# Atoms whose spellings are case-sensitive.
 _EXACT: dict[str, _Atom] = {
     "MN": (_FORCE, 1e6),
     "mN": (_FORCE, 1e-3),
     "MNm": (_MOMENT, 1e6),
     "mNm": (_MOMENT, 1e-3),
 }
+# The dimensions that a unit may have, for each kind of channels.
 _DIMENSIONS = {
     "time": (_TIME,),
     "angle": (_ANGLE,),
@@ -78,13 +82,13 @@ BASE_UNITS = {
     "moment": "N m",
 }
 _NO_UNITS = ("", "-", "1", "none", "n/a", "dimensionless")
-_MAX_LENGTH = 60  # characters of a unit
+_MAX_LENGTH = 60  # largest number of characters of a unit
 _SUPERSCRIPTS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻⁺−º·⋅×", "0123456789-+-°***")
 _TERM = re.compile(r"\s*([*./-]?)\s*([^\W\d_]+|°)(?:\^?[({]?([+-]?\d+)[)}]?)?")
 
 
 def plain_unit(text: str) -> str:
-    """Return a unit without its brackets and without "since ..."; "" for none.
+    """Return a unit without its brackets and without "since ..."; "" for texts such as "-".
 
     >>> plain_unit(" [rad]"), plain_unit("seconds since 2000-01-01"), plain_unit("(-)")
     ('rad', 'seconds', '')
@@ -98,13 +102,13 @@ def unit_factor(unit: str, kind: str) -> float | None:
 
     Parameters
     ----------
-    unit : in any usual spelling, with brackets or without.
-    kind : a key of `BASE_UNITS`.
+    unit : the unit in any usual spelling, with or without brackets.
+    kind : kind of the channels, a key of `BASE_UNITS`.
 
     Returns
     -------
     float or None
-        None for a unit that is unknown, or of another dimension.
+        The factor; None if the unit is unknown, or has another dimension than the kind.
 
     >>> unit_factor("rad s^-1", "rate"), unit_factor("kN·m", "moment"), unit_factor("kg", "force")
     (1.0, 1000.0, None)
@@ -112,7 +116,7 @@ def unit_factor(unit: str, kind: str) -> float | None:
     parsed = _parsed(plain_unit(unit))
     if parsed is None or parsed[0] not in _DIMENSIONS[kind]:
         return None
-    # "1/min" may mean turns per minute, and is refused; "1/s" is rad/s.
+    # "1/s" is read as rad/s. "1/min" is refused, because it may mean turns per minute.
     if parsed[0] == _PER_TIME and parsed[1] != 1.0:
         return None
     return parsed[1]
@@ -124,17 +128,18 @@ def is_unit(text: str) -> bool:
 
 
 def _parsed(unit: str) -> _Atom | None:
-    """Return exponents and factor of a unit.
+    """Return the dimension of a unit and its factor to SI units.
 
     Parameters
     ----------
-    unit : without brackets, at most `_MAX_LENGTH` characters.
+    unit : the unit without brackets.
 
     Returns
     -------
     _Atom or None
-        Exponents of time, angle, force and length, and the factor to SI units; None for an unknown
-        atom, an exponent above 3, or a text that is no unit.
+        Exponents of time, angle, force and length, and the factor to SI units; None if an atom is
+        unknown, an exponent is above 3 or below -3, the text has more than `_MAX_LENGTH`
+        characters, or it is no unit.
     """
     if not unit or len(unit) > _MAX_LENGTH:
         return None
@@ -166,15 +171,16 @@ def _parsed(unit: str) -> _Atom | None:
 
 
 def unit_of_attributes(attributes: Mapping[str, object]) -> str:
-    """Return the unit in the attribute `units` or `unit` of an array, "" where there is none.
+    """Return the unit in an attribute `units` or `unit` of an array; "" if there is none.
 
     Parameters
     ----------
-    attributes : of the array, by name; a unit is a text, bytes, or a list or array of one of them.
+    attributes : attributes of the array by name. The unit may be a text, bytes, or a list or array
+        with one text or bytes.
     """
     for name in ("units", "unit", "Units", "Unit", "UNITS"):
         value = attributes.get(name)
-        # An array of one text.
+        # An array with one element is replaced by this element.
         if getattr(value, "size", 0) == 1 and hasattr(value, "ravel"):
             value = value.ravel()[0]
         if isinstance(value, list | tuple) and len(value) == 1:
