@@ -1,8 +1,9 @@
-"""Readings of a column of a trajectory: which mistake turns the right numbers into these.
+"""Find the mistake in a column of a trajectory that explains how it differs from the reference.
 
-Mistakes are units, signs and zeros; rows that are late; differences in place of rates; means;
-numbers in coarse steps. A reading is compared with the reference in the rows up to the horizon, and
-the simplest that fits is taken.
+Possible mistakes are wrong units, signs and zeros; rows that are late or early; differences of
+angles in place of rates; means; numbers in coarse steps; and others. A reading assumes that the
+column has one of these mistakes. Each reading is compared with the reference in the rows up to the
+horizon, and the simplest reading that fits is taken.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from rotor_mbs.solution.trajectory import Array
 
 DEGREE, _TURN = math.pi / 180.0, 2.0 * math.pi
 DEGREE_TEXTS = {"angle": "degrees taken as rad", "rate": "deg/s taken as rad/s"}
+# Factors by which numbers with a wrong unit are multiplied, and the mistake in words.
 _FACTORS = {
     "angle": (
         (DEGREE, DEGREE_TEXTS["angle"]),
@@ -35,35 +37,39 @@ _FACTORS = {
 }
 LATE_OR_EARLY = (" late", " early")
 HELD = "every number is held"
-_MAX_ROWS_LATE = 3
-_MEANS_OF_ROWS = range(2, 22)
-_FINE_ROWS = 100  # intervals in which means over an interval are computed
-_SAMPLES = 20  # of an interval, for such means
-_MEANS_OF_SAMPLES = (2, 4, 5, 10, 20)
-_FAR_LESS = 0.02  # of what is left by a column in which nothing is wrong
-_MIN_COMPARED = 10  # rows: with fewer, some mean always fits
-_MIN_LIMITED = 3  # intervals in which a limited column does not change
-_MIN_STEPS = 10  # distinct numbers: fewer do not show a step
-_MAX_STEPS = 1 << 20  # in the range of a column: with more, steps are not coarse
-_MAX_DIVISIONS = 12  # of Euclid's algorithm
-_WHOLE = 1e-3  # of a step: a number of steps this near to a whole one is taken as whole
-_EQUAL_STEPS = 1e-6  # relative
-_MIN_SHARE = 0.01  # of a filter, from row to row
-_MAX_ROUNDING = 0.02  # of a difference that a filter explains
-_TRUNCATED = (("rounded", 0.5), ("cut off", 1.0))  # the error of a step, in steps
+_MAX_ROWS_LATE = 3  # largest number of rows by which a column may be late or early
+_MEANS_OF_ROWS = range(2, 22)  # numbers of rows over which a mean may be taken
+_FINE_ROWS = 100  # number of the first intervals for which means over an interval are computed
+_SAMPLES = 20  # number of parts of an interval, at whose ends the reference is computed for a mean
+_MEANS_OF_SAMPLES = (2, 4, 5, 10, 20)  # numbers of samples over which a mean may be taken
+# A mistake is accepted only if the error that it leaves is below this share of the error of the
+# uncorrected column.
+_FAR_LESS = 0.02
+_MIN_COMPARED = 10  # smallest number of rows for a comparison: in fewer rows, some mean always fits
+_MIN_LIMITED = 3  # smallest number of intervals without change in a limited column
+_MIN_STEPS = 10  # smallest number of distinct numbers from which a step is found
+_MAX_STEPS = 1 << 20  # largest number of steps in the range of a column with coarse steps
+_MAX_DIVISIONS = 12  # largest number of iterations of Euclid's algorithm
+_WHOLE = 1e-3  # largest deviation, in steps, from an integer number of steps
+_EQUAL_STEPS = 1e-6  # relative: time steps that differ by no more than this are taken as equal
+_MIN_SHARE = 0.01  # smallest share of the distance that a filter covers from row to row
+# Largest rounding of the corrected numbers, relative to the difference that a filter explains.
+_MAX_ROUNDING = 0.02
+# Ways of bringing numbers to coarse steps, and the largest error of each, in steps.
+_TRUNCATED = (("rounded", 0.5), ("cut off", 1.0))
 
 
 @dataclass(frozen=True)
 class Reading:
-    """A mistake that a column may have, and what it leaves.
+    """A mistake that a column may have, and the error that remains if the mistake is assumed.
 
     Attributes
     ----------
-    text : the mistake, "" for none.
-    left : the largest error per unit of growth, beyond rounding.
-    corrected, rounding : (rows,) the right numbers, and half a digit of each; None where they
-        cannot be found from the column.
-    is_processed : whether it is more than another unit, sign or zero.
+    text : the mistake in words, "" for none.
+    left : the largest remaining error per unit of error growth, beyond rounding.
+    corrected : (rows,) the right numbers; None if they cannot be found from the column.
+    rounding : (rows,) half a unit in the last digit of each number.
+    is_processed : whether the mistake is more than a wrong unit, sign, zero or factor.
     """
 
     text: str
@@ -78,13 +84,13 @@ class ColumnReadings:
 
     Parameters
     ----------
-    data : all rows.
-    states, carried : (n, 2 (1 + blades)) the reference, and `carried_errors`, in the rows from
-        t = 0 to the horizon.
-    states_at : returns the reference at other times, s.
-    allowed, tolerance : the largest error per unit of growth of a reading that fits; and that of
-        a column in which nothing is wrong.
-    with_factor : whether any factor of a channel may be wrong.
+    data : all rows of the data.
+    states, carried : (n, 2 (1 + blades)) the angles and rates of the reference, and its
+        `carried_errors`, in the rows from t = 0 to the horizon.
+    states_at : function that returns the angles and rates of the reference at given times, s.
+    allowed : largest error per unit of error growth that a reading may leave.
+    tolerance : largest error per unit of error growth of a column without a mistake.
+    with_factor : whether a column may also be wrong by any factor.
     """
 
     def __init__(
@@ -107,18 +113,20 @@ class ColumnReadings:
         self._fine: Array | None = None
 
     def best(self, j: int) -> Reading | None:
-        """Return the simplest reading of a column that fits about as well as the best of its kind.
+        """Return the simplest reading of a column among those that fit about equally well.
 
-        A reading with a mistake has to leave far less than the column as it is.
+        The column without a mistake is tried first, then wrong units, signs, zeros and factors,
+        then all other mistakes. A reading with a mistake fits only if it leaves a far smaller error
+        than the uncorrected column has.
 
         Parameters
         ----------
-        j : number of the column.
+        j : index of the column.
 
         Returns
         -------
         Reading or None
-            None where no reading fits.
+            The reading; None if none fits.
         """
         right = self._inverse(j, "", self.data.values[:, j])
         if right.left <= self._tolerance:
@@ -127,7 +135,8 @@ class ColumnReadings:
         reading = self._simplest(self._units(j), enough)
         if reading is not None:
             return reading
-        # Differences, means and late rows are nearly alike in a slow motion: all are compared.
+        # In a slow motion, differences, means and late rows give nearly the same numbers. All these
+        # readings are therefore compared before one is taken.
         kinds = (self._late_rows, self._steps, self._limits, self._sums, self._held, self._filtered)
         processed = itertools.chain.from_iterable(
             kind(j) for kind in (*kinds, self._differences, self._means)
@@ -142,13 +151,13 @@ class ColumnReadings:
 
         Parameters
         ----------
-        readings : the simplest first.
-        enough : what a reading that fits may leave.
+        readings : the readings, the simplest first.
+        enough : largest error per unit of error growth that a reading may leave.
 
         Returns
         -------
         Reading or None
-            None where no reading fits.
+            The reading; None if none fits.
         """
         readings = list(readings)
         least = min((reading.left for reading in readings), default=math.inf)
@@ -158,7 +167,15 @@ class ColumnReadings:
         return next(reading for reading in readings if reading.left <= alike)
 
     def _left(self, j: int, expected: Array, values: Array, rounding: Array | float) -> float:
-        """Return the largest error per unit of growth in the rows where both numbers are known."""
+        """Return the largest error of a column per unit of error growth, beyond rounding.
+
+        Parameters
+        ----------
+        j : index of the column.
+        expected, values : (n,) expected numbers, and numbers of the column, in the rows up to the
+            horizon. Rows in which one of them is NaN are left out.
+        rounding : part of each error that is due to rounding.
+        """
         is_known = np.isfinite(expected) & np.isfinite(values)
         if not is_known.any():
             return math.inf
@@ -167,18 +184,18 @@ class ColumnReadings:
         return float(error[is_known].max())
 
     def _expected(self, j: int) -> Array:
-        """Return the reference of a column in the rows up to the horizon."""
+        """Return the numbers of the reference for a column, in the rows up to the horizon."""
         return np.asarray(self._states[:, self.data.channels[j].column])
 
     def _inverse(self, j: int, text: str, corrected: Array, factor: float = 1.0) -> Reading:
-        """Return a reading of a column whose right numbers are known.
+        """Return a reading whose right numbers are found from the column.
 
         Parameters
         ----------
-        j : number of the column.
+        j : index of the column.
         text : the mistake in words, "" for none.
-        corrected : (rows,) the right numbers, NaN where they are not known.
-        factor : by which the numbers were multiplied, and with them their rounding.
+        corrected : (rows,) the right numbers, NaN in rows where they are unknown.
+        factor : factor by which the numbers of the column, and so their rounding, were multiplied.
         """
         rounding = self.data.rounding[:, j] * abs(factor)
         left = self._left(
@@ -187,11 +204,11 @@ class ColumnReadings:
         return Reading(text, left, corrected, rounding)
 
     def _units(self, j: int) -> Iterator[Reading]:
-        """Yield readings with another unit, sign or zero, missing turns, or any factor.
+        """Yield readings of a column with a wrong unit, sign, zero or factor, or missing turns.
 
         Parameters
         ----------
-        j : number of the column.
+        j : index of the column.
         """
         values, kind = self.data.values[:, j], self.data.channels[j].kind
         begin, start = self._begin, float(self._expected(j)[0])
@@ -208,7 +225,7 @@ class ColumnReadings:
                     mistakes.append(f"zero off by {zero:.6g}")
                 corrected = factor * values - zero
                 yield self._inverse(j, ", ".join(mistakes), corrected, factor)
-                # Whole turns cannot be restored where rounding is as large as half a turn.
+                # Whole turns cannot be restored if the rounding is half a turn or more.
                 is_known = FLOOR_SAFETY * abs(factor) * self.data.rounding[:, j].max() < 0.5 * _TURN
                 has_jumps = np.abs(np.diff(corrected)).max() > 0.5 * _TURN
                 if kind == "angle" and is_known and has_jumps:
@@ -218,7 +235,7 @@ class ColumnReadings:
                     yield self._inverse(j, text_of_turns, unwrapped, factor)
         expected = self._expected(j)
         if self._with_factor:
-            # The factor follows by least squares.
+            # The factor is found by least squares.
             factor = float(values[self._rows] @ expected / (expected @ expected))
             if factor:
                 text = f"too large by a factor of {factor:.6g}"
@@ -234,11 +251,11 @@ class ColumnReadings:
             yield self._inverse(j, f"{rows} early", np.concatenate([unknown, values[:-late]]))
 
     def _steps(self, j: int) -> Iterator[Reading]:
-        """Yield readings of numbers in coarse steps, or in half precision.
+        """Yield readings of a column with numbers in coarse steps, or in half precision.
 
         Parameters
         ----------
-        j : number of the column.
+        j : index of the column.
         """
         values, expected = self.data.values[:, j], self._expected(j)
         unit = self.data.channels[j].unit
@@ -261,9 +278,10 @@ class ColumnReadings:
             yield Reading(text, left, values, np.maximum(rounding, self.data.rounding[:, j]))
 
     def _step(self, j: int) -> float | None:
-        """Return the step of which the numbers of a column are multiples, None if there is none.
+        """Return the coarse step between the numbers of a column, None if there is none.
 
-        A column with few distinct numbers is tried with the step of another of the same kind.
+        If no step is found from the column itself, the step of another column of the same kind is
+        tried: a column may have too few distinct numbers.
         """
         channels = self.data.channels
         for other in (j, *range(len(channels))):
@@ -276,13 +294,22 @@ class ColumnReadings:
         return None
 
     def _forward(self, j: int, text: str, expected: Array) -> Reading:
-        """Return a reading that gives `expected` for the column, and no right numbers for it."""
+        """Return a reading whose right numbers cannot be found from the column.
+
+        Parameters
+        ----------
+        j : index of the column.
+        text : the mistake in words.
+        expected : (n,) numbers that the mistake makes of the reference, in the rows up to the
+            horizon; NaN in rows where they are unknown.
+        """
         values, rounding = self.data.values[self._rows, j], self.data.rounding[:, j]
         if np.count_nonzero(np.isfinite(expected)) < _MIN_COMPARED:
             return Reading(text, math.inf, None, rounding)
         rounding_here = FLOOR_SAFETY * rounding[self._rows]
         left = self._left(j, expected, values, rounding_here)
-        # In the same rows the column as it is has to be wrong: where nothing moves, anything fits.
+        # The uncorrected column has to be wrong in the same rows. Otherwise nothing may move in
+        # these rows, and then any reading fits.
         is_known = np.isfinite(expected)
         as_it_is = np.where(is_known, self._expected(j), np.nan)
         if not left < _FAR_LESS * self._left(j, as_it_is, values, rounding_here):
@@ -290,11 +317,11 @@ class ColumnReadings:
         return Reading(text, left, None, rounding)
 
     def _limits(self, j: int) -> Iterator[Reading]:
-        """Yield the reading of a column that is limited to its largest or least number.
+        """Yield readings of a column whose numbers a limit has cut off above or below.
 
         Parameters
         ----------
-        j : number of the column.
+        j : index of the column.
         """
         values, expected = self.data.values[:, j], self._expected(j)
         here = values[self._rows]
@@ -311,11 +338,13 @@ class ColumnReadings:
                 yield self._inverse(j, f"limited to at {which} {limit:.6g} {unit}", known)
 
     def _sums(self, j: int) -> Iterator[Reading]:
-        """Yield readings of a pitch to which the rotor is added, and of means of the pitches.
+        """Yield readings of a pitch plus or minus the rotor's angle, or a mean of all pitches.
+
+        The same is tried for rates.
 
         Parameters
         ----------
-        j : number of the column.
+        j : index of the column.
         """
         channel = self.data.channels[j]
         half = self._states.shape[1] // 2
@@ -330,7 +359,7 @@ class ColumnReadings:
         yield self._forward(j, "mean of the pitches of all blades", mean)
 
     def _held(self, j: int) -> Iterator[Reading]:
-        """Yield the reading of a column whose numbers are held for some rows."""
+        """Yield the reading of a column whose numbers change only every few rows."""
         values = self.data.values[:, j]
         period = held_rows(values[:, None])
         if period > 1:
@@ -339,14 +368,15 @@ class ColumnReadings:
             yield self._inverse(j, f"{HELD} for {period} rows", held)
 
     def _filtered(self, j: int) -> Iterator[Reading]:
-        """Yield the reading of a column behind a filter of first order.
+        """Yield the reading of a column that was smoothed by a first-order filter.
 
-        Such a filter moves a number by a share of the distance from the row before to the right
-        one: the share follows by least squares, and all right numbers but the first from the data.
+        From row to row, such a filter covers a constant share of the distance between its last
+        output and the right number. The share is found by least squares. With the share, all right
+        numbers but the first are computed from the column.
 
         Parameters
         ----------
-        j : number of the column.
+        j : index of the column.
         """
         values, rounding = self.data.values[:, j], self.data.rounding[:, j]
         steps = np.diff(self.data.time)
@@ -360,7 +390,8 @@ class ColumnReadings:
         right, growing = np.full(len(values), np.nan), rounding.copy()
         right[1:] = values[:-1] + np.diff(values) / share
         growing[1:] = (2.0 / share - 1.0) * np.maximum(rounding[1:], rounding[:-1])
-        # The rounding grows: where it is as large as the difference, it would explain anything.
+        # Undoing the filter amplifies the rounding. The reading is dropped if the rounding is not
+        # small compared with the difference, because it could then explain any difference.
         if not FLOOR_SAFETY * growing.max() <= _MAX_ROUNDING * np.abs(here - expected).max():
             return
         constant = float(-np.median(steps) / np.log1p(-share))
@@ -369,11 +400,11 @@ class ColumnReadings:
         yield Reading(text, left, right, growing)
 
     def _differences(self, j: int) -> Iterator[Reading]:
-        """Yield readings of differences of angles in place of a rate.
+        """Yield readings of a rate column that has difference quotients of the angle.
 
         Parameters
         ----------
-        j : number of the column.
+        j : index of the column.
         """
         channel = self.data.channels[j]
         if channel.kind != "rate":
@@ -393,11 +424,11 @@ class ColumnReadings:
         )
 
     def _means(self, j: int) -> Iterator[Reading]:
-        """Yield readings of means over rows, and over samples or the whole of an interval.
+        """Yield readings of a column that has means over rows or over an interval.
 
         Parameters
         ----------
-        j : number of the column.
+        j : index of the column.
         """
         expected = self._expected(j)
         count = len(expected)
@@ -412,7 +443,7 @@ class ColumnReadings:
             for text, before in ends:
                 of_rows = np.full(count, np.nan)
                 of_rows[before : before + len(means)] = means
-                # Every filter treats the rows at the ends in its own way: they are left out.
+                # Programs treat the rows at the ends in different ways; these rows are left out.
                 of_rows[: width - 1] = of_rows[count - width + 1 :] = np.nan
                 yield self._forward(j, f"mean of {width} rows {text}", of_rows)
         for text, means in self._means_of_samples(self.data.channels[j].column):
@@ -421,17 +452,20 @@ class ColumnReadings:
             yield self._forward(j, text, of_rows)
 
     def _means_of_samples(self, column: int) -> Iterator[tuple[str, Array]]:
-        """Yield means over the interval before, after and around each of the first rows.
+        """Yield means of the reference over the interval before, after or around a row.
+
+        A mean is an integral over the whole interval, or a mean of equally spaced samples. Means
+        are computed in the first `_FINE_ROWS` intervals only.
 
         Parameters
         ----------
-        column : of the matrix of angles, then rates.
+        column : index of the angle or rate in the matrix of angles, then rates.
 
         Yields
         ------
         str, ndarray
-            The kind of mean in words; (at most `_FINE_ROWS` + 1,) rad or rad/s, NaN where the
-            interval is not within these rows.
+            The kind of mean in words; (at most `_FINE_ROWS` + 1,) the mean for each of the first
+            rows, rad or rad/s, NaN if its interval is not within these rows.
         """
         time = self.data.time[self._rows][: _FINE_ROWS + 1]
         if len(time) < _MIN_COMPARED:
@@ -449,7 +483,8 @@ class ColumnReadings:
             kinds = [(f"mean over the interval {where} each row", *whole)]
             for samples in _MEANS_OF_SAMPLES:
                 stride = _SAMPLES // samples
-                # Of the interval before a row its end is one of the samples.
+                # The samples of an interval before a row include its end, but not its start. Those
+                # of the other intervals include the start, but not the end.
                 offsets = stride * np.arange(samples) + (stride if where == "before" else 0)
                 text = f"mean of {samples} samples of the interval {where} each row"
                 kinds.append((text, offsets, np.full(samples, 1.0 / samples)))
@@ -462,27 +497,40 @@ class ColumnReadings:
 
 
 def held_rows(values: Array) -> int:
-    """Return for how many rows each of (n, columns) numbers is held, 0 if there is one alone."""
+    """Return the number of rows after which numbers change, 0 if they never change.
+
+    Parameters
+    ----------
+    values : (n, columns) numbers.
+    """
     changes = np.flatnonzero(np.diff(values, axis=0).any(axis=1)) + 1
     if not len(changes):
         return 0
-    # The first number may be held for less: those of the nearest of every few rows are.
+    # The first number may be held for fewer rows than the others, for example if each row has the
+    # number of the nearest sample. The differences between changes do not depend on the first.
     return int(np.gcd.reduce(np.diff(changes))) if len(changes) > 1 else int(changes[0])
 
 
 def _step_between(values: Array) -> float | None:
-    """Return the step of which all differences are whole multiples, None where there is none.
+    """Return the step of which all differences between numbers are integer multiples.
 
     Parameters
     ----------
-    values : (n,) numbers; with fewer than `_MIN_STEPS` distinct ones no step is found.
+    values : (n,) numbers.
+
+    Returns
+    -------
+    float or None
+        The step; None if there is none, if it is not coarse, or if fewer than `_MIN_STEPS` numbers
+        are distinct.
     """
     distinct = np.unique(values)
     if len(distinct) < _MIN_STEPS:
         return None
     differences = np.diff(distinct)
     step = float(differences.min())
-    # Euclid's algorithm: a fast column passes several steps from row to row.
+    # The step is found by Euclid's algorithm, because the smallest difference may be several steps:
+    # a fast column passes several steps from row to row.
     for _ in range(_MAX_DIVISIONS):
         if not distinct[-1] - distinct[0] < _MAX_STEPS * step:
             return None
@@ -490,7 +538,8 @@ def _step_between(values: Array) -> float | None:
         if off.max() <= _WHOLE * step:
             break
         step = float(off[off > _WHOLE * step].min())
-    # The smallest difference gives the numbers of steps, their sum the step to more digits.
+    # The step is accurate enough to count the steps in each difference. The sum of the differences,
+    # divided by the sum of the counts, then gives the step with more digits.
     counts = np.round(differences / step)
     step = float(differences.sum() / counts.sum())
     if np.abs(differences / step - counts).max() > _WHOLE:

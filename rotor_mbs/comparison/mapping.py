@@ -1,7 +1,8 @@
-"""Find which column is which channel, its unit, sign and zero, from a mapping file or by names.
+"""Find the column, unit, sign and zero of each channel from a mapping file or names of columns.
 
-A channel is sign * (column + offset), the offset in the column's own unit. A mapping replaces
-single channels, or adds to those that are recognized by the names of columns. See docs/compare.md.
+The numbers of a channel are sign * (column + offset), with the offset in the unit of the column.
+The columns of channels that a mapping does not have are recognized by their names. See
+docs/compare.md.
 """
 
 from __future__ import annotations
@@ -43,17 +44,18 @@ _SIGN = keys.restricted(keys.whole(-1, 1), bool, "1, -1")
 
 @dataclass(frozen=True)
 class ColumnMapping:
-    """The source of a channel: sign * (column + offset) in `unit`.
+    """The source of a channel: sign * (column + offset), in the unit of the column.
 
     Attributes
     ----------
     column : name of the column.
-    unit : of the column, "" for the one that the file states, or the channel's SI unit.
+    unit : unit of the column. If it is "", the unit that the file states is used, or else the
+        channel's SI unit.
     sign : 1 or -1.
-    offset : in the column's unit.
-    wrapped : whether the angle starts again after each turn: jumps of more than half a turn are
-        removed.
-    frame : of a load, "" for that of the scene's loads.
+    offset : number that is added to the column, in the column's unit.
+    wrapped : whether the angle starts again from its first value after each turn. Jumps of more
+        than half a turn are then removed.
+    frame : frame of a load's components; "" for the frame of the scene's loads.
     """
 
     column: str = file_key("column", Kind(keys.read_text, "the name of a column"))
@@ -66,17 +68,19 @@ class ColumnMapping:
 
 @dataclass(frozen=True)
 class DataMapping:
-    """Content of a mapping file: what is said of the columns of data.
+    """Content of a mapping file, or of a dict with the same keys.
 
     Attributes
     ----------
-    columns : by the key of a channel; the others are recognized by the names of columns.
-    group : of an HDF5 file, see `runs.arrays.read_arrays`.
+    columns : the sources of channels, by the key of the channel. Other channels are recognized by
+        the names of columns.
+    group : group of an HDF5 file that is read, see `runs.arrays.read_arrays`.
     omitted : names of channels that are not compared, and need not be in the data.
-    only : names of the channels to which the comparison is restricted, beside the time or speed;
-        empty where it is not.
-    program : whose names, units, signs and frames the columns have: "openfast", or "".
-    openfast : numbers of the model, for OpenFAST's output.
+    only : names of the channels to which the comparison is restricted, besides the time or speed;
+        empty if it is not restricted.
+    program : "openfast" if the columns have the names, units, signs and frames of OpenFAST's
+        output, otherwise "".
+    openfast : numbers of the OpenFAST model that are needed to read its output.
     """
 
     columns: Mapping[str, ColumnMapping] = field(default_factory=dict)
@@ -88,7 +92,7 @@ class DataMapping:
 
 
 def _read_column_mapping(value: object) -> ColumnMapping:
-    """Read a channel's mapping: a table, or a column's name for a table with this name alone."""
+    """Read the source of a channel from a table, or from the name of its column alone."""
     table = {"column": value} if isinstance(value, str) else value
     mapping: ColumnMapping = keys.table_of(ColumnMapping).read(table)
     return mapping
@@ -107,14 +111,14 @@ def read_mapping(
 
     Parameters
     ----------
-    columns : a TOML file, or a mapping of the same keys; None for an empty mapping.
+    columns : path of a TOML file, or a dict with the same keys; None for an empty mapping.
     scene : the scene whose channels are keys of the mapping.
 
     Raises
     ------
     InputError
-        If the file cannot be read or has unknown keys or wrong values, each in a line; or if it is
-        empty, or maps a channel that is not in its `only`.
+        If the file cannot be read; if keys are unknown or values wrong, with a line for each; if
+        the mapping is empty, or maps a channel that is not in its `only`.
     """
     if columns is None:
         return DataMapping()
@@ -122,7 +126,8 @@ def read_mapping(
     declared = {}
     for channel in known:
         declared[channel.key] = file_key(channel.key, _COLUMN_MAPPING, default=None).metadata
-    # In `omit` and `only`, a load or kind of mode stands for all its components.
+    # In `omit` and `only`, the name of a load stands for all its components, and the name of a kind
+    # of frequency for the frequencies of all modes.
     names = {channel.key: channel.name for channel in known if channel.kind != "time"}
     names |= {name.replace(" ", "_"): name for name in (*LOAD_NAMES, *FREQUENCY_NAMES)}
     omit = keys.list_of(keys.choice(tuple(names)), f"a list of {', '.join(names)}")
@@ -162,15 +167,15 @@ def read_mapping(
 
 @dataclass(frozen=True)
 class FoundChannels:
-    """The sources of the channels of data, and what else the data have.
+    """The sources of the channels of data, and the columns that are no source.
 
     Attributes
     ----------
-    sources : by channel, the time or speed first; each with its unit.
-    lines : a line for each channel that says where it comes from.
-    unused : by name of every other column, why it is not compared.
-    loads_left_out : names of the loads that are recognized by their names and neither compared nor
-        omitted.
+    sources : the source of each channel, with its unit; the time or speed is first.
+    lines : a line for each channel that states its source.
+    unused : for every other column, by its name, the reason why it is not compared.
+    loads_left_out : names of loads that the names of columns suggest, but that are neither compared
+        nor omitted by the mapping.
     """
 
     sources: Mapping[Channel, ColumnMapping]
@@ -184,15 +189,16 @@ def find_channels(table: DataTable, scene: Scene, mapping: DataMapping) -> Found
 
     Parameters
     ----------
-    table : the columns. It is a table of modes if it has no time, but a speed and frequencies.
+    table : the columns of a trajectory, or of a table of modes, see `_known_channels`.
     scene : the scene whose channels the columns may be.
-    mapping : what is said of the columns.
+    mapping : content of the mapping file.
 
     Raises
     ------
     InputError
-        If two columns could be one channel, a unit is wrong, or a column with the name of a channel
-        has no numbers; if there is no time, or no angle or rate; of modes, no speed or frequency.
+        If two columns could be one channel, a unit does not fit its channel, or the values of a
+        column with a channel's name are no numbers; if a trajectory has no time, or neither angle
+        nor rate; if a table of modes has no speed, or no frequency.
     """
     lines: list[str] = []
     other_reasons: dict[str, str] = {}
@@ -235,7 +241,7 @@ def find_channels(table: DataTable, scene: Scene, mapping: DataMapping) -> Found
 
 
 def _of_suggestion(suggestion: openfast.Suggestion) -> tuple[Channel, ColumnMapping]:
-    """Return a channel of OpenFAST's output and its source."""
+    """Return a channel that a column of OpenFAST's output suggests, and its source."""
     source = ColumnMapping(
         column=suggestion.column,
         unit=suggestion.unit,
@@ -247,12 +253,12 @@ def _of_suggestion(suggestion: openfast.Suggestion) -> tuple[Channel, ColumnMapp
 
 
 def _stated_unit(table: DataTable, name: str) -> str:
-    """Return the unit that a file states for a column, "" where it states none."""
+    """Return the unit that a file states for a column, "" if it states none."""
     stated = table[name].unit or split_unit(name)[1]
     inner = name.strip()
     if stated or not inner.lower().startswith("der("):
         return stated
-    # The rate of "phi_deg" is in deg/s.
+    # The column is the rate of an angle whose name has a unit: "der(phi_deg)" is in deg/s.
     of_angle = split_unit(inner[4:].rstrip(")"))[1]
     return f"{of_angle}/s" if of_angle else ""
 
@@ -260,23 +266,29 @@ def _stated_unit(table: DataTable, name: str) -> str:
 def _known_channels(
     table: DataTable, scene: Scene, mapping: DataMapping
 ) -> tuple[list[Channel], list[tuple[Channel, str]]]:
-    """Decide whether a table is of a trajectory or of modes, and return its channels.
+    """Decide whether the data are a trajectory or a table of modes, and return the channels.
+
+    The data are a table of modes if the mapping has a channel of modes. Without a mapping of
+    columns, they are a table of modes if the names of columns suggest a speed and frequencies, but
+    no time.
 
     Parameters
     ----------
     table : the columns.
     scene : the scene whose channels the columns may be.
-    mapping : what is said of the columns.
+    mapping : content of the mapping file.
 
     Returns
     -------
     list of Channel, list of (Channel, str)
-        The channels that it may have; those that the names of its columns suggest, and the names.
+        All channels that such data may have; the channels that the names of columns suggest, each
+        with the name of its column.
     """
     motion, modes = channels(scene), mode_channels(scene)
     motion_by_name, modes_by_name = _suggested(table, motion), _suggested(table, modes)
     motion_keys = {channel.key for channel in motion}
-    # A mapping of a channel of either kind decides.
+    # If the mapping has a channel of modes or of a trajectory, it decides; the names of columns are
+    # used only if it has none.
     if any(channel.key in mapping.columns for channel in modes):
         return modes, modes_by_name
     if not motion_keys.isdisjoint(mapping.columns):
@@ -289,14 +301,15 @@ def _known_channels(
 
 
 def _suggested(table: DataTable, known: Sequence[Channel]) -> list[tuple[Channel, str]]:
-    """Return the channels that the names of columns suggest, and the names.
+    """Return the channels that the names of columns suggest, each with the name of its column.
 
     Parameters
     ----------
     table : the columns.
-    known : the channels that there may be.
+    known : all channels that the data may have.
     """
-    # How many columns an array has says what it may be: angles are one per coordinate.
+    # The number of an array's columns is needed, too: an array of angles has one column for each
+    # coordinate.
     places = places_of(list(table.columns))
     suggested = []
     for name in table.columns:
@@ -316,20 +329,20 @@ def _sources(
     by_name: Sequence[tuple[Channel, ColumnMapping]],
     mapping: DataMapping,
 ) -> tuple[dict[Channel, ColumnMapping], dict[str, str], tuple[str, ...]]:
-    """Return the source of each channel: what is mapped, and for others what names suggest.
+    """Return the source of each channel from the mapping, or else from the names of columns.
 
     Parameters
     ----------
     table : the columns.
-    known : the channels that there may be, the time or speed first.
+    known : all channels that the data may have, the time or speed first.
     by_name : the channels that names of columns suggest, and their sources.
-    mapping : what is said of the columns.
+    mapping : content of the mapping file.
 
     Returns
     -------
     dict, dict, tuple of str
-        By channel its source; by name of a column that is recognized and not compared, why; names
-        of the loads among these that are not omitted.
+        The sources by channel; the reasons, by name of the column, why recognized columns are not
+        compared; the names of loads in such columns that the mapping does not omit.
 
     Raises
     ------
@@ -378,19 +391,19 @@ def _sources(
 
 
 def _without_frame(channel: Channel) -> Channel:
-    """Return a load in the frame of the scene's loads; any other channel as it is."""
+    """Return a channel without the frame in its name, and so with the key of a mapping file."""
     return replace(channel, name=channel.name.partition(",")[0])
 
 
 def _is_unwanted(channel: Channel, mapping: DataMapping) -> bool:
-    """Return whether a mapping omits a channel, or restricts the channels to others."""
+    """Return whether a mapping omits a channel, or has an `only` without this channel."""
     if _is_one_of(channel, mapping.omitted):
         return True
     return bool(mapping.only) and not _is_one_of(channel, mapping.only)
 
 
 def _line(channel: Channel, source: ColumnMapping, *, is_assumed: bool) -> str:
-    """Return a line that says where a channel comes from: "rotor = -('a' +90) [deg]"."""
+    """Return a line that states the source of a channel: "rotor = -('a' +90) [deg]"."""
     term = repr(source.column)
     if source.offset:
         term = f"{term} {source.offset:+g}"
@@ -417,10 +430,10 @@ def _refuse_missing(
     Parameters
     ----------
     table : the columns.
-    known : the channels that there may be, the time or speed first.
-    chosen : the channels that are found, and their sources.
-    suggested : the channels that names of columns suggest, also those that are not wanted.
-    mapping : what is said of the columns.
+    known : all channels that the data may have, the time or speed first.
+    chosen : the channels that are compared, and their sources.
+    suggested : the channels that names of columns suggest, including those that the mapping omits.
+    mapping : content of the mapping file.
     """
     first = known[0]
     has_motion_or_mode = any(_is_motion_or_mode(channel, first) for channel in chosen)
@@ -428,8 +441,8 @@ def _refuse_missing(
         return
     compared = ["frequency"] if first.name == SPEED else ["angle", "rate"]
     if mapping.program and table.program != mapping.program:
-        # With `program`, only the program's own names are recognized: is what is missing there
-        # under another name?
+        # With `program`, only the names of that program's output are recognized. If the missing
+        # channel has one of the usual names, the message advises to leave `program` out.
         plain = [channel for channel, _ in _suggested(table, known)]
         if first in chosen:
             is_there = any(_is_motion_or_mode(channel, first) for channel in plain)
@@ -465,12 +478,24 @@ def _refuse_missing(
 
 
 def _is_motion_or_mode(channel: Channel, first: Channel) -> bool:
-    """Return whether a channel is an angle, rate or frequency; `first` is the time or speed."""
+    """Return whether a channel is an angle, rate or frequency.
+
+    Parameters
+    ----------
+    channel : the channel.
+    first : the channel of the time or speed, which is none of these.
+    """
     return not channel.is_load and channel != first
 
 
 def _is_one_of(channel: Channel, names: Sequence[str]) -> bool:
-    """Return whether a channel, or the load or modes that it belongs to, is one of `names`."""
+    """Return whether names have a channel, its load, or its kind of frequency.
+
+    Parameters
+    ----------
+    channel : the channel.
+    names : names of channels ("shaft force x"), loads ("shaft force"), or kinds of frequencies.
+    """
     name = channel.name.partition(",")[0]
     is_one_of_many = channel.is_load or channel.kind == "frequency"
     if name in names:

@@ -180,7 +180,7 @@ def unit_of_attributes(attributes: Mapping[str, object]) -> str:
     """
     for name in ("units", "unit", "Units", "Unit", "UNITS"):
         value = attributes.get(name)
-        # An array with one element is replaced by this element.
+        # A file may have the text in an array with one element.
         if getattr(value, "size", 0) == 1 and hasattr(value, "ravel"):
             value = value.ravel()[0]
         if isinstance(value, list | tuple) and len(value) == 1:
