@@ -1,7 +1,7 @@
-"""The channels that data may have, and the names of columns by which they are known.
+"""Define the channels that data may have, and recognize them by the names of columns.
 
-Channels are the time, angle and rate of every coordinate, and components of loads; of a table of
-modes the speed and frequencies.
+The channels of a trajectory are the time, the angle and rate of every coordinate, and the
+components of loads. The channels of a table of modes are the speed and the frequencies.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.quantities import LOADS
 
 TIME, SPEED = "time", "speed"
-# Names without digits, blanks and marks, as `known_names` lists them. The name of a rate is that of
-# its angle with a word of RATE_WORDS behind it, or d before it.
+# Names of columns in lower case, without digits, blanks and punctuation; `known_names` lists them.
+# A rate has the name of its angle, followed by a word of RATE_WORDS or preceded by "d".
 TIME_NAMES = ("time", "t", "times", "zeit")
 ROTOR_NAMES = (
     "rotor", "rotorangle", "rotorposition", "rot", "azimuth", "rotorazimuth", "azim", "psi", "phi",
@@ -32,7 +32,7 @@ PITCH_NAMES = (
 )  # fmt: skip
 ROTOR_RATE_NAMES = ("omega",)
 RATE_WORDS = ("rate", "speed", "velocity", "vel", "dot")
-# Names of arrays with a column for each coordinate.
+# Names of arrays that have a column for each coordinate.
 VECTOR_NAMES = {
     "angle": ("angles", "angle", "q", "qpos", "coordinates", "positions"),
     "rate": ("rates", "rate", "qd", "dq", "qdot", "qvel", "coordinates_t", "velocities"),
@@ -51,27 +51,29 @@ FREQUENCY_NAMES = {
     ),
 }  # fmt: skip
 LOAD_NAMES = tuple(load.name.replace("_", " ") for load in LOADS)
-# For each frame of a scene's loads, the other frames in which data may have these loads.
-# The frame "blade" turns with the pitch; "coned" is the blade's at zero pitch; "rotor" turns with
-# the rotor, y along the shaft and z across it (for a blade at its azimuth); "shaft" is the base
-# frame turned by the tilt.
+# A scene has loads in the frame "blade" or "base". For each of these two frames, the other frames
+# in which data may have the same loads.
+# The frame "blade" turns with the pitch. The frame "coned" is the frame "blade" at zero pitch. The
+# frame "rotor" turns with the rotor; its y axis is along the shaft and its z axis normal to it,
+# for a blade at the blade's azimuth. The frame "shaft" is the base frame turned by the tilt.
 FRAMES = {"blade": ("coned", "rotor", "shaft", "base"), "base": ("shaft", "rotor")}
 LOAD_FRAMES = ("blade", *FRAMES["blade"])
 _FRAME_ENDINGS = [[frame, "frame"] for frame in LOAD_FRAMES]
-# OpenFAST's root loads, of the blade on the hub: x along the shaft, z along the blade, y against
-# the rotor's sense; the axes b turn with the pitch, the axes c do not.
+# Root loads of OpenFAST, which the blade exerts on the hub. Its x axis is along the shaft, z along
+# the blade, and y against the rotor's sense of rotation. The axes "b" turn with the pitch, the axes
+# "c" do not.
 _OPENFAST = re.compile(r"root([fm])([xyz])([bc])(\d+)", re.IGNORECASE)
 _OPENFAST_AXES = {"x": ("y", -1), "y": ("x", 1), "z": ("z", -1)}
 _UNIT_ENDING = re.compile(
     r"_((?:rad|deg|turns|rev)(?:_per_s|/s|_s)?|rpm|hz|s|ms|us|min|(?-i:k?Nm?))$", re.IGNORECASE
 )
-_BEYOND_INDICES = 10**10
-_DERIVATIVE = re.compile(r"der\s*\((.*)\)", re.IGNORECASE)  # of Modelica and FMI
-_MODELICA = ((".phi", ""), (".w", " rate"))  # angle and rate of a joint
+_BEYOND_INDICES = 10**10  # a number that is larger than any index of a column
+_DERIVATIVE = re.compile(r"der\s*\((.*)\)", re.IGNORECASE)  # as in Modelica and FMI
+_MODELICA = ((".phi", ""), (".w", " rate"))  # endings of the angle and rate of a joint in Modelica
 
 
 def channel_key(name: str) -> str:
-    """Return the key of a channel in mapping files and its variable in records: "pitch_1_rate"."""
+    """Return the key of a channel in mapping files and in records: "pitch_1_rate"."""
     return name.replace(",", "").replace(" ", "_")
 
 
@@ -81,12 +83,13 @@ class Channel:
 
     Attributes
     ----------
-    name : in words.
-    kind : of its unit, a key of `BASE_UNITS`.
-    column : index of the channel among all angles, rates and loads, in this order; in a table of
-        modes among the damped, then the undamped frequencies; -1 for time and speed.
-    frame : of a load, where it is not the scene's.
-    sign : -1 for a name of another program, such as OpenFAST's, that means the opposite sign.
+    name : name of the channel in words.
+    kind : kind of the quantity, which determines its unit: a key of `BASE_UNITS`.
+    column : index of the channel among all angles, rates and loads, in this order. In a table of
+        modes, the index among the damped, then the undamped frequencies. -1 for time and speed.
+    frame : frame of a load's component if it is not the frame of the scene's loads; otherwise "".
+    sign : -1 if the program that uses the column's name has the opposite sign, as OpenFAST has for
+        some loads; otherwise 1.
     """
 
     name: str
@@ -97,7 +100,7 @@ class Channel:
 
     @property
     def key(self) -> str:
-        """Return the key in a mapping file: "pitch_1_rate"."""
+        """Return the key of the channel in a mapping file: "pitch_1_rate"."""
         return channel_key(self.name)
 
     @property
@@ -112,7 +115,13 @@ class Channel:
 
     @property
     def own_frame(self) -> str:
-        """Return the frame in which a scene has this load, "" where it has no components."""
+        """Return the frame in which a scene has this load.
+
+        Returns
+        -------
+        str
+            "blade" or "base"; "" for a load without components, and for a channel that is no load.
+        """
         if self.name.startswith("blade root"):
             return "blade"
         return "base" if self.name.startswith("shaft") else ""
@@ -143,7 +152,7 @@ def channels(scene: Scene) -> list[Channel]:
 
     Parameters
     ----------
-    scene : the rotor, whose number of blades counts.
+    scene : the scene. Its number of blades determines the channels.
     """
     labels = scene.coordinate_labels
     known = [Channel(TIME, "time", -1)]
@@ -171,7 +180,7 @@ def mode_channels(scene: Scene) -> list[Channel]:
 
 
 def known_names() -> list[tuple[str, ...]]:
-    """Return rows of a table: what a column may be, and the names by which it is known."""
+    """Return the rows of a table for the user: a quantity, and the names of columns for it."""
     affixes = f"the suffix {', '.join(RATE_WORDS[:-1])} or {RATE_WORDS[-1]}, or the prefix d"
     rows: list[tuple[str, ...]] = [
         ("time", ", ".join(TIME_NAMES)),
@@ -197,14 +206,14 @@ def known_names() -> list[tuple[str, ...]]:
 
 
 class Entry(NamedTuple):
-    """The name of a numbered column, `q[2,1]` or `pitch_2`, divided into array and numbers.
+    """The numbers in the name of a numbered column, such as `q[2,1]` or `pitch_2`.
 
     Attributes
     ----------
-    key : the name with a mark in place of the numbers: what all columns of the array have.
-    numbers : in the name.
-    start, end : where the numbers, with their square brackets if they have any, stand in the name
-        without its unit.
+    key : the name with a mark in place of the numbers. All columns of an array have the same key.
+    numbers : the numbers.
+    start, end : positions in the name without its unit at which the numbers start and end. Square
+        brackets around the numbers are included.
     """
 
     key: str
@@ -214,16 +223,17 @@ class Entry(NamedTuple):
 
 
 def entry_of(name: str) -> Entry | None:
-    """Return the numbers in a column's name and what surrounds them.
+    """Return the numbers in a column's name, and their position.
 
     Parameters
     ----------
-    name : of the column. Numbers in its last square brackets count, else the last number.
+    name : name of the column. The numbers in its last square brackets are taken. If there are no
+        numbers in brackets, the last number in the name is taken.
 
     Returns
     -------
     Entry or None
-        None for a name without numbers.
+        The numbers; None for a name without numbers.
     """
     plain = split_unit(name)[0]
     end = plain.rfind("]")
@@ -245,8 +255,8 @@ class Place(NamedTuple):
 
     Attributes
     ----------
-    columns : how many columns the array has.
-    indices : of the column, from 0.
+    columns : number of columns of the array.
+    indices : indices of the column in the array, counted from 0.
     """
 
     columns: int
@@ -254,15 +264,16 @@ class Place(NamedTuple):
 
 
 def places_of(names: Sequence[str]) -> dict[str, Place]:
-    """Return the places of numbered columns in their arrays, by name.
+    """Return the places of numbered columns in their arrays, by name of the column.
 
-    Modelica and FMI count from 1, Python from 0: a dimension in which no column has the number 0
-    counts from 1. A dimension of length 1 is left out if another one is longer, as in `q[1,1]` ...
-    `q[4,1]`.
+    Modelica and FMI count from 1, Python from 0. If no column of an array has the number 0 in a
+    dimension, this dimension is counted from 1. A dimension of length 1 is left out if another
+    dimension is longer, as in `q[1,1]` ... `q[4,1]`.
 
     Parameters
     ----------
-    names : of all columns of the data, as the others of its array decide what a number means.
+    names : names of all columns of the data. The place of a column depends on the other columns of
+        its array.
     """
     arrays: dict[str, dict[str, tuple[int, ...]]] = {}
     for name in names:
@@ -289,16 +300,16 @@ def places_of(names: Sequence[str]) -> dict[str, Place]:
 def channel_from_name(
     name: str, vector: int, known: Sequence[Channel], indices: Sequence[int] | None = None
 ) -> Channel | None:
-    """Return the channel that a column's name suggests, None where it suggests none.
+    """Return the channel that a column's name suggests, None if it suggests none.
 
     Parameters
     ----------
-    name : of the column, "rotor_deg", or of an array's column, "q[0]"; der(x) is the rate of x.
-    vector : number of columns of its array, 0 for a column of no array. `q[0]` is the rotor if the
-        array has a column for each coordinate.
-    known : `channels` or `mode_channels`.
-    indices : see `Place`; by default the numbers in the name, which count from 0 in square brackets
-        and from 1 elsewhere.
+    name : name of a column, such as "rotor_deg", "q[0]" in an array, or "der(x)" for the rate of x.
+    vector : number of columns of the column's array; 0 if it is in no array. For example, `q[0]` is
+        the rotor only if the array has a column for each coordinate.
+    known : all channels that the data may have, by `channels` or `mode_channels`.
+    indices : indices of the column in its array, see `Place`. By default they are the numbers in
+        the name, counted from 0 if they are in square brackets, otherwise from 1.
     """
     stripped = name.strip().strip("\"'").strip()
     inner = _DERIVATIVE.fullmatch(split_unit(stripped)[0])
@@ -307,8 +318,8 @@ def channel_from_name(
     channel = _channel_of_path(stripped, vector, known, indices)
     folder, _, last = split_unit(stripped)[0].rpartition("/")
     if channel is None and folder and last:
-        # The last part of a name such as "run/rates/rotor" tells the coordinate; an earlier part
-        # may tell that it is a rate.
+        # In a name such as "run/rates/rotor", the last part is the name of the coordinate. An
+        # earlier part may be the name of an array of rates; the column then is a rate.
         channel = _channel_of_path(last, vector, known, indices)
         parts = {_array_name(part) for part in folder.split("/")}
         if channel is not None and parts & set(_RATE_ARRAYS):
@@ -317,7 +328,7 @@ def channel_from_name(
 
 
 def names_a_channel(name: str, known: Sequence[Channel]) -> bool:
-    """Return whether a name is that of a channel, or of an array of channels."""
+    """Return whether a name is the name of a channel, or of an array of channels."""
     if channel_from_name(name, 0, known) is not None:
         return True
     array = _array_name(split_unit(name)[0].rpartition("/")[2])
@@ -334,14 +345,15 @@ def arrays_of_other_length(
 
     Parameters
     ----------
-    names : of all columns of the data.
-    known : the channels that there may be.
-    kind : "angle" or "rate", to find only arrays of this kind; by default both are found.
+    names : names of all columns of the data.
+    known : all channels that the data may have.
+    kind : "angle" or "rate" to find only arrays of this kind; by default both kinds are found.
 
     Returns
     -------
     dict of str
-        For each column of such an array, by name, both numbers in words.
+        For each column of such an array, by its name, a text with the number of the array's columns
+        and that of the scene's coordinates.
     """
     reasons: dict[str, str] = {}
     if known[0].name == SPEED:
@@ -366,7 +378,10 @@ def arrays_of_other_length(
 
 
 def _load_arrays(channel: Channel) -> tuple[str, ...]:
-    """Return the names of arrays that a load may be a column of: of all blades, and of one."""
+    """Return the names of arrays of which a load's component may be a column.
+
+    There are two names: that of an array of all blades, and that of an array of one blade.
+    """
     if not channel.is_load:
         return ()
     of_one = channel.name.rstrip("xyz ")
@@ -374,21 +389,23 @@ def _load_arrays(channel: Channel) -> tuple[str, ...]:
 
 
 def _rate_of(channel: Channel | None, known: Sequence[Channel]) -> Channel | None:
-    """Return the rate of an angle; None for another channel."""
+    """Return the channel of an angle's rate; None if the given channel is no angle."""
     if channel is None or channel.kind != "angle":
         return None
     return _named(f"{channel.name} rate", known)
 
 
 def _array_name(name: str) -> str:
-    """Return the name of an array in the form in which names are compared: "qdot" for "Q_dot"."""
+    """Return an array's name in lower case without blanks, "_" and ".": "qdot" for "Q_dot"."""
     return re.sub(r"[\s_.]", "", name).lower()
 
 
 def _channel_of_path(
     name: str, vector: int, known: Sequence[Channel], indices: Sequence[int] | None
 ) -> Channel | None:
-    """Return the channel of a name that is taken whole, with its folders; None if unknown.
+    """Return the channel that a whole name suggests, None if it suggests none.
+
+    Parts of a path in the name are not tried alone.
 
     Parameters
     ----------
@@ -414,7 +431,8 @@ def _channel_of_path(
                 return found
         if len(indices) != 1:
             return None
-        # From here on the number is that of a blade, which counts from 1.
+        # The column is in no array of a known name, so its number is taken as that of a blade.
+        # Blades are counted from 1.
         plain = f"{plain[: entry.start]} {indices[0] + 1} {plain[entry.end :]}"
     load = _named_load(plain, known)
     if load is not None:
@@ -429,9 +447,9 @@ def _channel_of_path(
     channel = _angle_or_rate(letters, numbers, known)
     if channel is None or entry is None:
         return channel
-    # Several rotor angles in an array are the azimuths of the blades, and more pitches than blades
-    # may begin with the rotor: their columns are not identified. A number without brackets, as in
-    # "pitch_2", is that of the blade.
+    # Two kinds of arrays are not identified. An array of several rotor angles has the azimuths of
+    # the blades. An array of more pitches than blades may have the rotor as its first column. A
+    # pitch whose number has no brackets, as in "pitch_2", is identified: the number is the blade's.
     blades = sum(other.kind == "angle" for other in known) - 1
     allowed = 1 if channel.name.startswith("rotor") else blades
     return (
@@ -442,7 +460,7 @@ def _channel_of_path(
 
 
 def _number(digits: str) -> int:
-    """Return digits as a number; one beyond all indices for no digits or too many."""
+    """Return digits as a number; `_BEYOND_INDICES` if there are no digits or too many."""
     return int(digits) if 0 < len(digits) < 10 else _BEYOND_INDICES
 
 
@@ -452,21 +470,21 @@ def _named(name: str, known: Sequence[Channel]) -> Channel | None:
 
 
 def _has_one_blade(known: Sequence[Channel]) -> bool:
-    """Return whether there is only pitch 1, whose number may be left out."""
+    """Return whether the rotor has one blade; names may then lack the blade's number."""
     return _named("pitch 2", known) is None
 
 
 def _mode_channel(
     plain: str, known: Sequence[Channel], *, is_entry: bool, indices: Sequence[int] | None
 ) -> Channel | None:
-    """Return the channel of a table of modes that a name suggests, None where it suggests none.
+    """Return the channel of a table of modes that a name suggests, None if it suggests none.
 
     Parameters
     ----------
-    plain : the name without its unit, in lower case.
+    plain : name of the column without its unit, in lower case.
     known : `mode_channels`.
-    is_entry : whether the number stands in square brackets, where it counts from 0.
-    indices : see `Place`; None where the number in the name counts.
+    is_entry : whether the number in the name is in square brackets, and so is counted from 0.
+    indices : indices of the column in its array, see `Place`; None to take the number in the name.
     """
     letters, numbers = re.sub(r"[^a-z]", "", plain), re.findall(r"\d+", plain)
     if letters in SPEED_NAMES:
@@ -477,15 +495,21 @@ def _mode_channel(
         if indices is not None:
             number = 1 + (indices[0] if len(indices) == 1 else _BEYOND_INDICES)
         elif is_entry:
-            number += 1  # indices begin with 0
+            number += 1  # the number of a mode is counted from 1
     for kind, names in FREQUENCY_NAMES.items():
-        if letters in names and plain != "mode":  # a column "mode" has the numbers of modes
+        if letters in names and plain != "mode":  # a column "mode" has numbers of modes
             return _named(f"{kind} {number}", known)
     return None
 
 
 def _openfast_load(match: re.Match[str], known: Sequence[Channel]) -> Channel | None:
-    """Return the root load with a matched name of OpenFAST, None if there is no such blade."""
+    """Return the root load that a name of OpenFAST means, None if there is no such blade.
+
+    Parameters
+    ----------
+    match : match of the name with `_OPENFAST`.
+    known : `channels`.
+    """
     quantity, openfast_axis, frame, blade = match.groups()
     axis, sign = _OPENFAST_AXES[openfast_axis]
     kind = "force" if quantity == "f" else "moment"
@@ -498,14 +522,15 @@ def _openfast_load(match: re.Match[str], known: Sequence[Channel]) -> Channel | 
 def _array_channel(
     array: str, indices: Sequence[int], vector: int, known: Sequence[Channel]
 ) -> Channel | None:
-    """Return the channel of an array's column, None for arrays of another name or length.
+    """Return the channel of an array's column, None if the array has another name or length.
 
     Parameters
     ----------
     array : name of the array, see `_array_name`.
-    indices : of the column, from 0: one, or two of a load, blade and axis.
-    vector : how many columns the array has, which has to be the number of its channels.
-    known : the channels that there are.
+    indices : indices of the column, counted from 0. There is one index, or for a load there may be
+        two: blade and axis.
+    vector : number of columns of the array, which has to equal the number of its channels.
+    known : all channels that the data may have.
     """
     fitting = [channel for channel in known if array in _VECTORS.get(channel.kind, ())]
     if fitting and len(indices) != 1:
@@ -514,14 +539,20 @@ def _array_channel(
         fitting = [channel for channel in known if array in _load_arrays(channel)]
     place = indices[0]
     if len(indices) == 2:
-        place = 3 * indices[0] + indices[1]  # blades and axes
+        place = 3 * indices[0] + indices[1]  # blade and axis
     if len(fitting) != vector or not 0 <= place < vector or max(indices) >= vector:
         return None
     return fitting[place]
 
 
 def _named_load(plain: str, known: Sequence[Channel]) -> Channel | None:
-    """Return the component of a load with a name that may end in a frame; None if unknown."""
+    """Return the load's component that a name means, None if the name is unknown.
+
+    Parameters
+    ----------
+    plain : name of the column without its unit; it may end in a frame, "... coned frame".
+    known : all channels that the data may have.
+    """
     words = re.findall(r"[a-z]+|\d+", plain)
     frame = ""
     if words[-2:] in _FRAME_ENDINGS:
@@ -538,13 +569,13 @@ def _named_load(plain: str, known: Sequence[Channel]) -> Channel | None:
 def _angle_or_rate(
     letters: str, numbers: Sequence[str], known: Sequence[Channel]
 ) -> Channel | None:
-    """Return the angle or rate whose name has these letters and numbers.
+    """Return the angle or rate that the letters and numbers of a name mean, None if unknown.
 
     Parameters
     ----------
-    letters : of the name without its unit, "pitchrate".
-    numbers : in the name, the last of which is a blade's.
-    known : the channels that there are.
+    letters : the letters of the name without its unit, "pitchrate".
+    numbers : the numbers in the name. For a pitch, the last one is the number of the blade.
+    known : all channels that the data may have.
     """
     ending = next((word for word in RATE_WORDS if letters.endswith(word)), "")
     stem = letters.removesuffix(ending)
@@ -564,7 +595,9 @@ def _angle_or_rate(
 
 
 def split_unit(name: str) -> tuple[str, str]:
-    """Return name and unit of a column whose name ends in a unit.
+    """Split a column's name into name and unit; the unit is "" if there is none.
+
+    In addition to the forms of `split_bracketed_unit`, endings such as "_deg_s" are recognized.
 
     >>> split_unit("pitch_1_rate_deg_s"), split_unit("rotor in rad"), split_unit("rotor")
     (('pitch_1_rate', 'deg/s'), ('rotor', 'rad'), ('rotor', ''))

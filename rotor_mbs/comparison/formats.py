@@ -1,13 +1,13 @@
-"""Read a file of any format, in the process that `comparison.files` starts.
+"""Read a file of any format, in the worker process that `comparison.files` starts.
 
-The libraries: pandas for text and for tables in JSON, NumPy for .npz, pymatreader and SciPy for MAT
-files, SciPy for netCDF-3, h5py for HDF5 and netCDF-4, openfast_io for .outb. xarray unpacks arrays
-of netCDF and HDF5 as the CF conventions say. The headers of text are read here, also those of
-OpenFAST and Exudyn.
+Libraries read the numbers: pandas those of text and of tables in JSON, NumPy .npz, pymatreader and
+SciPy MAT files, SciPy netCDF-3, h5py HDF5 and netCDF-4, openfast_io .outb. xarray unpacks arrays of
+netCDF and HDF5 by the CF conventions. The headers of text files, including those of OpenFAST and
+Exudyn, are read by the code below.
 
-A file may be damaged, or made to harm: what it claims to hold is bounded before it is read, and the
-process has limits of memory and time for what no check foresees. The time that a regular expression
-takes here is proportional to the length of its text.
+A file may be damaged or malicious. The size of the arrays that a file claims to have is therefore
+checked before they are read. The process has limits of memory and time for all other cases. The
+regular expressions below take a time that is proportional to the length of the text.
 """
 
 from __future__ import annotations
@@ -42,9 +42,11 @@ from rotor_mbs.comparison.columns import (
 from rotor_mbs.comparison.units import unit_factor, unit_of_attributes
 from rotor_mbs.errors import InputError, RotorError
 
-# Of a file, and of its arrays unpacked; a million rows of ten columns are 80 MB.
+# Largest size of a file in bytes, and of all its arrays after unpacking. A million rows of ten
+# columns take 80 MB.
 MAX_BYTES = 1 << 29
-_MAX_PROBLEM = 2000  # characters of a message, which may name groups of the file
+# Largest number of characters of a message, which may contain names from the file.
+_MAX_PROBLEM = 2000
 FORMATS = "text with a header, .json, .npz, .mat, HDF5, netCDF, OpenFAST .out and .outb"
 _HDF5, _NETCDF3 = b"\x89HDF\r\n\x1a\n", b"CDF"
 _ZIP, _MATLAB_5, _MATLAB_73 = b"PK\x03\x04", b"MATLAB 5.0 MAT-file", b"MATLAB 7.3 MAT-file"
@@ -52,8 +54,9 @@ _MATLAB_NUMBERS = {
     "double", "single", "logical", "int8", "int16", "int32", "int64", "uint8", "uint16", "uint32",
     "uint64",
 }  # fmt: skip
-_UTF_16 = (b"\xff\xfe", b"\xfe\xff")  # spreadsheets' "Unicode text"
-# What the netCDF library writes into rows that were never written, where a file states no other.
+_UTF_16 = (b"\xff\xfe", b"\xfe\xff")  # first bytes of "Unicode text" from a spreadsheet program
+# Numbers that the netCDF library stores in rows that no program has written, by type. A file may
+# state another number.
 _DEFAULT_FILL = {
     "f4": 9.969209968386869e36,
     "f8": 9.969209968386869e36,
@@ -62,37 +65,41 @@ _DEFAULT_FILL = {
     "i4": -2147483647,
     "i8": -9223372036854775806,
 }
-_PACKING = ("scale_factor", "add_offset", "_FillValue", "missing_value")  # attributes
-_MAX_PARTS = 10_000  # arrays, cells and fields of a MAT or JSON file that are read
+# Attributes of an array that is packed or has missing values.
+_PACKING = ("scale_factor", "add_offset", "_FillValue", "missing_value")
+_MAX_PARTS = 10_000  # largest number of arrays, cells and fields read from a MAT or JSON file
 
-# Text: comma-separated values, columns divided by blanks, Exudyn's files, OpenFAST's `.out`.
-_COMMENT = ("#", "%", "//", "!")
-_DIVIDERS = (";", "\t", ",", None)  # None: blanks
+# Constants for text files: comma-separated values, columns separated by blanks, Exudyn's files, and
+# OpenFAST's `.out`.
+_COMMENT = ("#", "%", "//", "!")  # first characters of a comment line
+_DIVIDERS = (";", "\t", ",", None)  # separators of fields; None stands for blanks
 _OPENFAST_HEAD = re.compile(r"^Predictions were generated .{0,80}\b(?:Open)?FAST\b")
 _EXUDYN = re.compile(r"OutputVariableType = (\w+)")
-# Exudyn's solution file: how many columns it has of each kind, behind the time.
+# The head of Exudyn's solution file has the number of columns of each kind; the time is the first
+# column and not counted.
 _EXUDYN_SOLUTION = re.compile(r"written coordinates \[[^\][]*\] = \[([\d, ]+)\]")
 _EXUDYN_KINDS = (
     "coordinates", "coordinates_t", "accelerations", "ode1", "ode1_t", "algebraic", "data",
 )  # fmt: skip
 _DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+(?:[eE][+-]?\d+)?")
 _FORTRAN = re.compile(r"(?<=[\d.])[dD](?=[+-]?\d)")  # 1.5D-03
-_FORTRAN_3_DIGITS = re.compile(r"(?<=[\d.])(?=[+-]\d{3}$)")  # 0.123456-101: no room for the E
-# What programs write where they have no number, also in the first row of numbers.
+# 0.123456-101: Fortran leaves out the E before an exponent of three digits.
+_FORTRAN_3_DIGITS = re.compile(r"(?<=[\d.])(?=[+-]\d{3}$)")
+# Texts that programs write in place of a missing number. The first row of numbers may have them.
 _MISSING = re.compile(r"\*+|-+|\?|#?n/?a!?|null|none|missing|nil", re.IGNORECASE)
-_MAX_SEARCHED = 200  # lines that are searched for a header where some columns are texts
+_MAX_SEARCHED = 200  # largest number of lines that are searched for a header of special tables
 
 Arrays = Mapping[str, Any]
 Units = Mapping[str, str]
-Lines = Sequence[tuple[int, str]]  # number of the line in the file, its text
+Lines = Sequence[tuple[int, str]]  # the number of each line in the file, and its text
 
 
 def read_in_worker(arguments: tuple[Path, str, str]) -> DataTable:
-    """Read a file in the process that `comparison.files` starts.
+    """Read a file in the worker process that `comparison.files` starts.
 
     Parameters
     ----------
-    arguments : path, group and scene, see `read_columns`.
+    arguments : the arguments path, group and scene of `read_columns`.
 
     Returns
     -------
@@ -125,19 +132,19 @@ def read_in_worker(arguments: tuple[Path, str, str]) -> DataTable:
         raise
     except RecursionError:
         problems = [f"{path}: cannot be read: nested too deeply; allowed: {FORMATS}"]
-    except Exception as exc:  # of any library
+    except Exception as exc:  # a library may raise any exception for a damaged file
         problems = [f"{path}: cannot be read: {_line(exc)}; allowed: {FORMATS}"]
     raise InputError(problems)
 
 
 def _line(exc: BaseException) -> str:
-    """Return the first line of an exception's text, cut to 200 characters, or else its type."""
+    """Return the first line of an exception's text, up to 200 characters; its type if no text."""
     lines = str(exc).splitlines()
     return lines[0][:200] if lines else type(exc).__name__
 
 
 def _short_names(by_name: Mapping[str, Any]) -> dict[str, Any]:
-    """Return values by names of bounded length, which stay distinct."""
+    """Return values by name, with long names cut but still distinct."""
     short = {}
     for number, (name, value) in enumerate(by_name.items(), start=1):
         label = name if len(name) <= MAX_NAME else f"{name[:MAX_NAME]}... (column {number})"
@@ -150,22 +157,23 @@ def read_columns(path: Path, group: str, scene: str) -> DataTable:
 
     Parameters
     ----------
-    path : the file; its format is recognized by its first bytes, that of `.outb` by its ending.
-    group, scene : of an HDF5 file, see `runs.arrays.read_arrays`.
+    path : the file. The format is recognized by the first bytes of the file; OpenFAST's binary
+        output is recognized by its ending `.outb`.
+    group, scene : the group of an HDF5 file that is read, and the name of a scene whose groups are
+        preferred, see `runs.arrays.read_arrays`.
 
     Raises
     ------
     RotorError
-        If the file cannot be read, with a message of one line. Other exceptions of the libraries
-        are not caught here.
+        If the file cannot be read. Other exceptions, which libraries raise, are not caught here.
     """
     with path.open("rb") as file:
         begin = file.read(1024)
     source = str(path)
-    # The version and the order of bytes are the last four bytes of MATLAB's header.
+    # The last four of the 128 bytes of MATLAB's header are the version and the byte order.
     has_version = begin[124:128] in (b"\x00\x02IM", b"\x02\x00MI")
     is_matlab_73 = begin.startswith(_MATLAB_73) and has_version
-    # In files of MATLAB 7.3, 512 bytes of its own stand before the signature of HDF5.
+    # A file of MATLAB 7.3 has 512 bytes of MATLAB before the signature of HDF5.
     is_hdf5 = begin.startswith(_HDF5) or begin[512:].startswith(_HDF5)
     if group and (is_matlab_73 or not is_hdf5):
         problem = f"a format without groups, but the mapping has group = {group!r}"
@@ -193,13 +201,14 @@ def read_columns(path: Path, group: str, scene: str) -> DataTable:
     del content
     if _is_json(text):
         table = table_of(source, *_json(text))
-        # Where JSON has NaN, a missing number is not certainly a null.
+        # If the file has NaN too, a missing number may be a NaN instead of a null; the message then
+        # does not say "null".
         return table if "NaN" in text else _with_nulls(table)
     return _read_text(source, text)
 
 
 def _refuse_large(path: Path, size: float) -> None:
-    """Raise InputError if arrays of this size, in bytes, are more than is read."""
+    """Raise InputError if the size of all arrays of a file, in bytes, is above `MAX_BYTES`."""
     if size > MAX_BYTES:
         allowed = f"up to {MAX_BYTES / 2**30:g} GB: export fewer rows or arrays"
         raise InputError(f"{path}: its arrays claim {size / 2**30:.1f} GB; allowed: {allowed}")
@@ -215,14 +224,15 @@ def _numpy_archive(path: Path) -> tuple[Arrays, list[str]]:
     Returns
     -------
     dict, list of str
-        Arrays by name; names of arrays of Python objects, which are not read.
+        The arrays by name; the names of arrays of Python objects, which are not read.
 
     Raises
     ------
     InputError
         If the arrays claim more than `MAX_BYTES`.
     """
-    # An entry is read to the size that the archive declares for it, and no further.
+    # NumPy reads no more of an entry than the size that the archive declares, so the declared sizes
+    # are checked.
     with zipfile.ZipFile(path) as entries:
         _refuse_large(path, sum(entry.file_size for entry in entries.infolist()))
     arrays: dict[str, Any] = {}
@@ -234,7 +244,7 @@ def _numpy_archive(path: Path) -> tuple[Arrays, list[str]]:
             except ValueError as exc:
                 if "allow_pickle" not in str(exc):
                     raise
-                objects.append(name)  # pickles, which are programs
+                objects.append(name)  # objects are stored as pickles, which can execute any code
     return arrays, objects
 
 
@@ -242,18 +252,19 @@ def _numpy_archive(path: Path) -> tuple[Arrays, list[str]]:
 
 
 def _is_matlab_4(begin: bytes) -> bool:
-    """Return whether a file begins with the header of an array as MATLAB 4 writes it.
+    """Return whether a file begins with the header of an array in the format of MATLAB 4.
 
-    The header has five whole numbers: machine, precision and kind as decimal digits of one number;
-    rows; columns; whether the array is complex; length of its name.
+    The header has five integers. The first has machine, precision and kind of the array as decimal
+    digits. The others are the number of rows, the number of columns, 1 for a complex array or else
+    0, and the length of the name.
 
     Parameters
     ----------
-    begin : the first bytes of the file; fewer than 20 are no header.
+    begin : the first bytes of the file. A header has 20 bytes.
     """
     if len(begin) < 20:
         return False
-    # Files are written in the order of bytes of their machine: both are tried.
+    # The file has the byte order of the machine that wrote it; both orders are tried.
     for order in "<>":
         kind, rows, columns, is_complex, length = struct.unpack(f"{order}5i", begin[:20])
         digits = kind // 1000, kind // 100 % 10, kind // 10 % 10, kind % 10
@@ -269,12 +280,13 @@ def _matlab(path: Path, *, is_hdf5: bool) -> Arrays:
     Parameters
     ----------
     path : the file.
-    is_hdf5 : whether it is of version 7.3, which is HDF5.
+    is_hdf5 : whether the file has the format of MATLAB 7.3, which is HDF5.
 
     Returns
     -------
     dict
-        Arrays by name; those of structures by "structure/field", of cells by "name/1".
+        The arrays by name. An array in a structure has the name "structure/field", an array in a
+        cell array the name "cells/1".
 
     Raises
     ------
@@ -290,36 +302,46 @@ def _matlab(path: Path, *, is_hdf5: bool) -> Arrays:
         refuse_claims(path, MAX_BYTES)
     try:
         if not is_hdf5:
-            # This reads the headers of the arrays alone: structures and cells are not unpacked.
+            # Only the headers of the outermost arrays are read. Structures and cells are not
+            # unpacked here, so the sizes of arrays in them are not checked.
             shapes = [shape for _, shape, kind in whosmat(path) if kind in _MATLAB_NUMBERS]
             _refuse_large(path, sum(8.0 * math.prod(shape) for shape in shapes))
         content = read_mat(str(path))
     except (RotorError, MemoryError, RecursionError):
         raise
-    except Exception as exc:  # what SciPy raises for a damaged file may be anything
+    except Exception as exc:  # SciPy may raise any exception for a damaged file
         raise InputError(f"{path}: not a MAT file that can be read; allowed: {FORMATS}") from exc
     names = [name for name in content if not (name.startswith("__") or name == "#refs#")]
     return dict(_parts("", {name: content[name] for name in names}))
 
 
 def _parts(path: str, value: Any) -> Iterator[tuple[str, Any]]:
-    """Yield the first `_MAX_PARTS` nested arrays with their paths, "out/q" or "cells/1"."""
+    """Yield the arrays in a nested value with their paths, at most `_MAX_PARTS` of them.
+
+    Parameters
+    ----------
+    path, value : see `_all_parts`.
+    """
     yield from itertools.islice(_all_parts(path, value), _MAX_PARTS)
 
 
 def _all_parts(path: str, value: Any) -> Iterator[tuple[str, Any]]:
     """Yield the arrays in nested mappings, lists and cells with their paths.
 
+    The arrays in the fields of a mapping are yielded with the path "path/field". The arrays in the
+    entries of a list, or of an array of objects, are yielded with the paths "path/1", "path/2"...
+    Every other value, also a list of numbers or a list of lists, is yielded itself.
+
     Parameters
     ----------
-    path : of the value, "" for the whole file.
-    value : a mapping, whose fields are yielded; a list, or array of objects, whose entries are
-        yielded from "path/1" on; anything else, and a list of rows of numbers, is yielded itself.
+    path : path of the value in the file, "" for the whole file.
+    value : the value.
     """
     prefix = f"{path}/" if path else ""
     if isinstance(value, Mapping):
         fields = dict(value)
-        # Simulink's "structure with time": the values of a signal have the name of its label.
+        # This mapping is Simulink's "structure with time". The values of a signal get the signal's
+        # label as name.
         if "time" in fields and isinstance(fields.get("signals"), Mapping):
             signals = fields.pop("signals")
             yield from _signals(prefix, signals)
@@ -330,7 +352,7 @@ def _all_parts(path: str, value: Any) -> Iterator[tuple[str, Any]]:
         value = list(value.flat)
     if isinstance(value, list) and any(_has_parts(part) for part in value[:_MAX_PARTS]):
         if all(isinstance(part, list) for part in value):
-            yield path, value  # rows of numbers, as JSON has them
+            yield path, value  # in JSON, an array of two dimensions is a list of rows
             return
         for number, part in enumerate(value, start=1):
             yield from _all_parts(f"{prefix}{number}", part)
@@ -344,7 +366,13 @@ def _has_parts(value: Any) -> bool:
 
 
 def _signals(prefix: str, signals: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
-    """Yield the values of Simulink's signals by their labels."""
+    """Yield the values of Simulink's signals, with their labels as names.
+
+    Parameters
+    ----------
+    prefix : path of the structure, with "/" at its end unless it is empty.
+    signals : the structure's field `signals`.
+    """
     values, labels = signals.get("values"), signals.get("label", "")
     if not isinstance(values, list):
         values, labels = [values], [labels]
@@ -367,8 +395,8 @@ def _netcdf_3(path: Path) -> tuple[Arrays, Mapping[str, Mapping[str, Any]]]:
     Returns
     -------
     arrays, attributes : dict
-        The numbers of each variable as they are stored, by the variable's name; and its
-        attributes, by the variable's name, then by their own.
+        The numbers of each variable as they are stored, by name of the variable; the attributes of
+        each variable, by name of the variable, then by name of the attribute.
 
     Raises
     ------
@@ -381,8 +409,8 @@ def _netcdf_3(path: Path) -> tuple[Arrays, Mapping[str, Mapping[str, Any]]]:
 
     arrays: dict[str, Any] = {}
     attributes: dict[str, dict[str, Any]] = {}
-    # Variables are views of the file. Several may be views of the same bytes, so that a small file
-    # may claim large arrays: their sizes are checked before they are copied.
+    # Variables are views of the file, and several variables may be views of the same bytes. A small
+    # file may thus claim large arrays, so the sizes are checked before the arrays are copied.
     with netcdf_file(path, "r", mmap=True, maskandscale=False) as file:
         sizes = [8.0 * math.prod(variable.shape) for variable in file.variables.values()]
         _refuse_large(path, sum(sizes))
@@ -393,7 +421,7 @@ def _netcdf_3(path: Path) -> tuple[Arrays, Mapping[str, Mapping[str, Any]]]:
             for key in ARRAY_ATTRIBUTES:
                 if hasattr(variable, key):
                     attributes[name][key] = getattr(variable, key)
-            # The netCDF library fills rows that were never written with this number.
+            # The netCDF library stores this number in rows that no program has written.
             fill = _DEFAULT_FILL.get(arrays[name].dtype.str[1:])
             if fill is not None:
                 attributes[name].setdefault("_FillValue", fill)
@@ -406,13 +434,14 @@ def _hdf5(path: Path, group: str, scene: str) -> DataTable:
     Parameters
     ----------
     path : the file.
-    group, scene : which group, see `runs.arrays.read_arrays`.
+    group, scene : the group that is read, and the name of a scene whose groups are preferred, see
+        `runs.arrays.read_arrays`.
 
     Raises
     ------
     RotorError
-        If the file cannot be read, claims more than `MAX_BYTES`, or has the layout of pandas'
-        `to_hdf`.
+        If the file cannot be read, its arrays claim more than `MAX_BYTES`, or it has the layout of
+        pandas' `to_hdf`.
     """
     from rotor_mbs.runs import arrays as hdf5_arrays  # late: 0.2 s
     from rotor_mbs.runs.design import RUNS
@@ -427,8 +456,8 @@ def _hdf5(path: Path, group: str, scene: str) -> DataTable:
         allowed = "a table that other programs can read: to_csv, or to_xarray().to_netcdf"
         raise InputError(f"{path}: pandas' own layout of HDF5 (to_hdf); allowed: {allowed}")
     for name, values in arrays.items():
-        # The netCDF library fills floating-point rows that were never written with this number; the
-        # HDF5 library fills them with 0.
+        # In floating-point rows that no program has written, the netCDF library stores this number.
+        # The HDF5 library stores 0.
         fill = _DEFAULT_FILL.get(values.dtype.str[1:]) if values.dtype.kind == "f" else None
         if fill is not None:
             attributes[name].setdefault("_FillValue", fill)
@@ -440,16 +469,16 @@ def _hdf5(path: Path, group: str, scene: str) -> DataTable:
 
 
 def _decoded(source: str, arrays: Arrays, attributes: Mapping[str, Mapping[str, Any]]) -> DataTable:
-    """Return stored arrays as columns, unpacked as the CF conventions say.
+    """Unpack stored arrays by the CF conventions, and return them as columns.
 
-    Scales and offsets are applied, missing values become NaN; times stay numbers. An array of
-    integers of 32 or 64 bits in which packing has overflown is left out.
+    Scales and offsets are applied; missing values become NaN; times remain numbers. A packed array
+    of signed 32-bit or 64-bit integers is left out if a number did not fit when it was packed.
 
     Parameters
     ----------
-    source : what messages call the file.
-    arrays : by name, as they are stored.
-    attributes : by name of the array, its attributes by their names.
+    source : name of the file in messages.
+    arrays : arrays by name, as they are stored.
+    attributes : the attributes of each array, by name of the array, then by name of the attribute.
 
     Raises
     ------
@@ -471,14 +500,14 @@ def _decoded(source: str, arrays: Arrays, attributes: Mapping[str, Mapping[str, 
         for key in ("_FillValue", "missing_value"):
             if key in facts:
                 facts[key] = np.asarray(facts[key]).ravel()[0]
-        if isinstance(facts.get("_Unsigned"), bytes):  # as SciPy reads netCDF-3
+        if isinstance(facts.get("_Unsigned"), bytes):  # SciPy reads texts of netCDF-3 as bytes
             facts["_Unsigned"] = facts["_Unsigned"].decode("latin-1")
         is_packed = not facts.keys().isdisjoint(_PACKING)
         if is_packed and values.dtype.kind in "iu":
             if "scale_factor" in facts:
                 steps[name] = abs(float(np.asarray(facts["scale_factor"]).ravel()[0]))
-            # xarray unpacks into the precision of these two. Single precision would add a rounding
-            # that the data do not have.
+            # xarray unpacks to the precision of these two attributes. If they have single
+            # precision, unpacking would add a rounding that the data do not have.
             for key, default in (("scale_factor", 1.0), ("add_offset", 0.0)):
                 facts[key] = np.float64(np.asarray(facts.get(key, default)).ravel()[0])
         dimensions = [f"dimension_{number}_{axis}" for axis in range(values.ndim)]
@@ -490,7 +519,8 @@ def _decoded(source: str, arrays: Arrays, attributes: Mapping[str, Mapping[str, 
     overflown = {}
     for name in steps:
         stored = arrays[name].ravel()
-        # A number that does not fit 32 or 64 bits is stored as the smallest integer.
+        # In a conversion to a 32-bit or 64-bit integer, a number that does not fit becomes the
+        # smallest integer.
         is_least = (stored == np.iinfo(stored.dtype).min) & np.isfinite(unpacked[name].ravel())
         is_signed = stored.dtype.kind == "i" and variables[name][2].get("_Unsigned") != "true"
         if is_signed and stored.itemsize > 2 and is_least.any():
@@ -503,7 +533,7 @@ def _decoded(source: str, arrays: Arrays, attributes: Mapping[str, Mapping[str, 
 
 
 def _openfast(path: Path) -> tuple[Arrays, Units]:
-    """Read OpenFAST's binary output by the reader of its own project, openfast_io.
+    """Read OpenFAST's binary output with openfast_io, the reader of the OpenFAST project.
 
     Parameters
     ----------
@@ -512,7 +542,7 @@ def _openfast(path: Path) -> tuple[Arrays, Units]:
     Returns
     -------
     dict, dict
-        Arrays by name; units by name.
+        The arrays by name; the units by name.
 
     Raises
     ------
@@ -524,11 +554,11 @@ def _openfast(path: Path) -> tuple[Arrays, Units]:
     except ImportError as exc:
         hint = 'pip install "rotor_mbs[openfast]", or text output (OutFileFmt 1)'
         raise InputError(f"{path}: openfast_io is not installed; allowed: {hint}") from exc
-    # That reader allocates what the header claims, so the claim is checked first.
+    # openfast_io allocates the memory that the header claims, so the claim is checked first.
     with path.open("rb") as file:
         begin = file.read(12)
     offset = 4 if begin[:2] == b"\x04\x00" else 2
-    counts = struct.unpack_from("<ii", begin, offset)  # channels, rows
+    counts = struct.unpack_from("<ii", begin, offset)  # numbers of channels and rows
     number_bytes = 8 if begin[:2] == b"\x03\x00" else 2
     if min(counts) < 0 or math.prod(counts) * number_bytes > path.stat().st_size:
         problem = "cannot be read: it has fewer numbers than it claims"
@@ -543,7 +573,7 @@ def _openfast(path: Path) -> tuple[Arrays, Units]:
 
 
 def _is_json(text: str) -> bool:
-    """Return whether a text begins as JSON: an object, or a list of objects or lists."""
+    """Return whether a text begins like JSON with an object, or a list of objects or lists."""
     begin = text[:1000].lstrip()
     return begin.startswith("{") or (begin[:1] == "[" and begin[1:].lstrip()[:1] in "[{")
 
@@ -553,19 +583,19 @@ def _json(text: str) -> tuple[Arrays, Units]:
 
     Parameters
     ----------
-    text : content of the file. The forms of a table are: a list of objects, one for each row; an
-        object on each line; {"columns": ..., "data": ...}; {"schema": ..., "data": ...}; an object
-        with an object for each column, or for each row.
+    text : content of the file. A table has one of these forms: a list with an object for each row;
+        an object on each line; {"columns": ..., "data": ...}; {"schema": ..., "data": ...}; an
+        object with an object for each column, or for each row.
 
     Returns
     -------
     dict, dict
-        Arrays by name; units by name.
+        The arrays by name; the units by name, of the arrays that have one.
 
     Raises
     ------
     ValueError
-        If the text is no JSON, or a list of anything but objects.
+        If the text is no JSON, or is a list with elements other than objects.
     """
     import pandas as pd  # late: 0.3 s
 
@@ -598,7 +628,7 @@ def _json(text: str) -> tuple[Arrays, Units]:
 
 
 def _with_nulls(table: DataTable) -> DataTable:
-    """Return the columns of JSON, each with the place of its first null as `missing`."""
+    """Return columns of JSON with a text about the first null of each, see `DataColumn.missing`."""
     columns = {}
     for name, column in table.columns.items():
         is_missing = np.isnan(column.values)
@@ -617,23 +647,24 @@ def _read_text(source: str, text: str) -> DataTable:
 
     Parameters
     ----------
-    source : what messages call the file.
-    text : comma-separated values, columns divided by blanks, Exudyn's files, OpenFAST's `.out`.
+    source : name of the file in messages.
+    text : content of the file: comma-separated values, columns separated by blanks, a file of
+        Exudyn, or OpenFAST's `.out`.
 
     Raises
     ------
     InputError
-        If there are no rows of numbers, no names for the columns, or lines with different numbers
+        If there are no rows of numbers or no names for the columns, or lines have different numbers
         of fields.
     """
     lines = []
     for number, line in enumerate(text.splitlines(), start=1):
-        # Spreadsheets write lines of nothing but dividers for empty rows.
+        # Spreadsheet programs write an empty row as a line of separators only.
         if line.strip(" \t,;"):
             lines.append((number, line.strip(" ")))
     lines = _with_vectors_as_columns(lines)
     first, divider = _first_row(source, lines)
-    head = [line for _, line in lines[:first]]  # with comments
+    head = [line for _, line in lines[:first]]  # lines above the numbers, including comments
     closing = {}
     width = len(_fields(lines[first][1], divider))
     while len(lines) > first + 1 and _is_closing(lines[-1][1], divider, width):
@@ -650,14 +681,14 @@ def _read_text(source: str, text: str) -> DataTable:
     plain = [line for line in head if not line.startswith(_COMMENT)]
     names = _names(source, plain or comments, len(columns), divider)
     named: dict[str, DataColumn] = {}
-    headers: dict[str, str] = {}  # of columns with a name that occurs before, see `DataTable`
+    headers: dict[str, str] = {}  # see `DataTable.headers`
     left_out: dict[str, LeftOut] = dict(closing)
     repeats: dict[str, int] = {}
     for number, ((name, unit), values) in enumerate(zip(names, columns, strict=True)):
         is_empty = isinstance(values, np.ndarray) and bool(np.isnan(values).all())
         if not name and is_empty:
-            continue  # a divider at the end of every line makes a column of nothing
-        # Further columns with the same name are kept, with "_" before the name.
+            continue  # a separator at the end of every line makes an empty column without a name
+        # A column whose name has occurred before is kept, with "_" before the name.
         count = repeats.get(name, 0)
         label = name
         while label in named or label in left_out:
@@ -677,21 +708,29 @@ def _read_text(source: str, text: str) -> DataTable:
 
 
 def _is_closing(line: str, divider: str | None, width: int) -> bool:
-    """Return whether a last line is text, no row: "This output file was closed on 19-Oct-2018."."""
+    """Return whether the last line of a file is a text below the rows, such as a closing remark.
+
+    Parameters
+    ----------
+    line : the line.
+    divider : separator of fields, None for blanks.
+    width : number of fields of a row.
+    """
     fields = _fields(line, divider)
     numbers, others = _kinds_of_fields(fields, divider)
     return not line.startswith(_COMMENT) and not numbers and bool(others) and len(fields) != width
 
 
 def _with_vectors_as_columns(lines: list[tuple[int, str]]) -> list[tuple[int, str]]:
-    """Return lines in which each entry of a vector has a field of its own.
+    """Return the lines of a file with a separate field for each entry of a vector.
 
-    FMI 3 writes a vector into one field: "time,y" above "0,1 2 3" becomes "time","y[0]","y[1]",
-    "y[2]" above 0,1,2,3.
+    FMI 3 writes all entries of a vector into one field. The header "time,y" with the row "0,1 2 3"
+    becomes the header "time","y[0]","y[1]","y[2]" with the row 0,1,2,3.
 
     Parameters
     ----------
-    lines : lines of the file and their numbers; without such vectors they are returned unchanged.
+    lines : lines of the file and their numbers. If there are no vectors, they are returned
+        unchanged.
     """
     for (_, above), (_, row) in itertools.pairwise(lines[:_MAX_SEARCHED]):
         for divider in (",", ";"):
@@ -727,19 +766,21 @@ def _exudyn(
 
     Parameters
     ----------
-    source : what messages call the file.
-    comments : the lines of comments above the numbers.
+    source : name of the file in messages.
+    comments : comment lines above the numbers.
     columns : (n,) numbers of each column, the time first.
 
     Returns
     -------
     DataTable or None
-        Columns of the last solve, named by the head of the file; None for a file of another kind.
+        The columns, with names from the head of the file. If the file has several solves, only the
+        rows of the last one are returned. None if the file is neither a sensor nor a solution file.
 
     Raises
     ------
     InputError
-        If a column is not of numbers, or there are more or fewer columns than the head says.
+        If a column has values that are no numbers, or the number of columns is not that in the
+        head.
     """
     text = "\n".join(comments)
     variable, written = _EXUDYN.search(text), _EXUDYN_SOLUTION.search(text)
@@ -777,20 +818,20 @@ def _first_row(source: str, lines: Lines) -> tuple[int, str | None]:
 
     Parameters
     ----------
-    source : what messages call the file.
+    source : name of the file in messages.
     lines : lines of the file and their numbers.
 
     Returns
     -------
     int, str or None
-        Its place in `lines`; what divides its fields, None for blanks.
+        Index of the row in `lines`; separator of its fields, None for blanks.
 
     Raises
     ------
     InputError
-        If there is no row of numbers; the message has the line with the most numbers.
+        If there is no row of numbers. The message then names the line with the most numbers.
     """
-    # Of the line with the most numbers: how many, and the text that keeps it from being a row.
+    # The message names the line with the most numbers among the lines that also have other texts.
     most_numbers, nearest = 0, ""
     for place, (number, line) in enumerate(lines):
         if line.startswith(_COMMENT):
@@ -799,8 +840,8 @@ def _first_row(source: str, lines: Lines) -> tuple[int, str | None]:
             fields = _fields(line, divider)
             numbers, others = _kinds_of_fields(fields, divider)
             if len(fields) > 1 and numbers and not others:
-                # An earlier line may be a row with a text in place of a number. It is a row, and
-                # no header, if its first field is a number, such as the time.
+                # An earlier line may be a row with a text in place of a number. That line is taken
+                # as a row, not as a header, if its first field is a number, such as the time.
                 with_texts = _first_row_with_texts(lines[: place + 1])
                 if with_texts is not None:
                     first = _fields(lines[with_texts[0]][1], with_texts[1])[0]
@@ -823,17 +864,18 @@ def _first_row(source: str, lines: Lines) -> tuple[int, str | None]:
 def _first_row_with_texts(lines: Lines) -> tuple[int, str | None] | None:
     """Find the first row of a table in which some columns are texts.
 
-    Two rows with numbers follow a header, which has as many fields and no numbers.
+    Such a table is recognized by a line without numbers, the header, and two lines below it that
+    have numbers. All three lines have the same number of fields.
 
     Parameters
     ----------
-    lines : lines of the file and their numbers, of which `_MAX_SEARCHED` are searched.
+    lines : lines of the file and their numbers. The first `_MAX_SEARCHED` lines are searched.
 
     Returns
     -------
     (int, str or None) or None
-        Place of the row in `lines`, and what divides its fields, None for blanks; None if there
-        are no such rows.
+        Index of the row in `lines`, and separator of its fields, None for blanks; None if there is
+        no such table.
     """
     plain = []
     for place, (_, line) in enumerate(lines[:_MAX_SEARCHED]):
@@ -852,7 +894,19 @@ def _first_row_with_texts(lines: Lines) -> tuple[int, str | None] | None:
 
 
 def _kinds_of_fields(fields: Sequence[str], divider: str | None) -> tuple[int, list[str]]:
-    """Return how many fields are numbers, and those that are neither numbers nor missing ones."""
+    """Count the fields that are numbers, and list the fields that are other texts.
+
+    Parameters
+    ----------
+    fields : fields of a line.
+    divider : separator of fields, None for blanks.
+
+    Returns
+    -------
+    int, list of str
+        The number of fields that are numbers; the fields that are neither numbers, nor empty, nor a
+        mark for a missing number.
+    """
     numbers, others = 0, []
     for field in fields:
         if _is_number(_without_fortran(field), decimal_comma=divider != ","):
@@ -863,19 +917,19 @@ def _kinds_of_fields(fields: Sequence[str], divider: str | None) -> tuple[int, l
 
 
 def _without_fortran(field: str) -> str:
-    """Return a number of Fortran with an E: 1.5E-3 for 1.5D-3, 0.15E-101 for 0.15-101."""
+    """Return a number of Fortran with the letter E: 1.5E-3 for 1.5D-3, 0.15E-101 for 0.15-101."""
     return _FORTRAN_3_DIGITS.sub("E", _FORTRAN.sub("E", field))
 
 
 def _fields(line: str, divider: str | None) -> list[str]:
-    """Return the fields of a line; divider None stands for blanks."""
+    """Return the fields of a line; the separator `divider` is None for blanks."""
     if divider is None:
         return line.split()
     return [field.strip() for field in next(csv.reader([line], delimiter=divider))]
 
 
 def _is_number(field: str, *, decimal_comma: bool) -> bool:
-    """Return whether a field is a number, with `decimal_comma` also one like 1,5."""
+    """Return whether a field is a number; with `decimal_comma`, 1,5 is a number, too."""
     try:
         float(field)
     except ValueError:
@@ -890,31 +944,33 @@ def _columns_of_rows(
 
     Parameters
     ----------
-    source : what messages call the file.
+    source : name of the file in messages.
     rows : line number in the file, and text, of each row.
-    divider : what divides the fields of a line, None for blanks.
+    divider : separator of the fields of a line, None for blanks.
 
     Returns
     -------
     list of ndarray or LeftOut
-        (n,) numbers of each column, NaN where a field is empty; of a column with a field that is
-        no number, the first such field.
+        For each column, its (n,) numbers, with NaN for an empty field. If a field of the column is
+        no number, a `LeftOut` that names the first such field.
 
     Raises
     ------
     InputError
-        If a line has another number of fields than the first, or there are too many columns.
+        If a line has another number of fields than the first line, or there are more than
+        `MAX_COLUMNS` columns.
     """
     import pandas as pd  # late: 0.3 s
 
     width = len(_fields(rows[0][1], divider))
     if width > MAX_COLUMNS:
         raise InputError(f"{source}: {width} columns; allowed: up to {MAX_COLUMNS}")
-    # In numbers with points a comma may stand between thousands; without points it is decimal.
+    # Commas that do not separate fields are decimal commas, unless a row has a point: in numbers
+    # with decimal points, a comma may separate thousands.
     is_comma = divider != "," and not any("." in row for _, row in rows)
     body = io.StringIO("\n".join(row for _, row in rows))
-    # Numbers are to be read to their last bit; since pandas 3.1 this is the default, and the option
-    # is deprecated.
+    # Numbers have to be exact to the last bit. pandas 3.1 and later read them so by default, and
+    # the option is deprecated.
     options: dict[str, Any] = {}
     if tuple(int(part) for part in pd.__version__.split(".")[:2]) < (3, 1):
         options["float_precision"] = "round_trip"
@@ -936,7 +992,8 @@ def _columns_of_rows(
     except pd.errors.ParserError:
         _refuse_ragged(source, rows, divider, width)
         raise
-    # pandas fills rows that are too short with empty fields; complete rows may end in one, too.
+    # pandas adds empty fields to rows that are too short. The fields are counted then, because a
+    # complete row may also end with an empty field.
     if len(frame) != len(rows) or frame[width - 1].isna().any():
         _refuse_ragged(source, rows, divider, width)
     columns: list[NDArray[np.float64] | LeftOut] = []
@@ -952,12 +1009,12 @@ def _columns_of_rows(
 def _missing_field(
     values: NDArray[np.float64], number: int, rows: Lines, divider: str | None
 ) -> str:
-    """Return what stands in place of the first missing number, see `DataColumn.missing`.
+    """Return the text about the first missing number of a column, see `DataColumn.missing`.
 
     Parameters
     ----------
-    values : (n,) numbers of a column, NaN where one is missing.
-    number : of the column, from 0.
+    values : (n,) numbers of a column, NaN for a missing number.
+    number : index of the column, counted from 0.
     rows, divider : see `_columns_of_rows`.
     """
     is_missing = np.isnan(values)
@@ -970,7 +1027,7 @@ def _missing_field(
 
 
 def _refuse_ragged(source: str, rows: Lines, divider: str | None, width: int) -> None:
-    """Raise InputError for the first line with another number of fields."""
+    """Raise InputError if a line has a number of fields other than `width`."""
     for number, line in rows:
         count = len(_fields(line, divider))
         if count != width:
@@ -981,18 +1038,18 @@ def _refuse_ragged(source: str, rows: Lines, divider: str | None, width: int) ->
 def _numbers_of_texts(
     fields: NDArray[Any], rows: Lines, *, is_comma: bool
 ) -> NDArray[np.float64] | LeftOut:
-    """Return the numbers of a column that pandas has left as texts, as it does Fortran's numbers.
+    """Convert a column that pandas has left as texts to numbers, for example those of Fortran.
 
     Parameters
     ----------
-    fields : (n,) texts and numbers, NaN where a field is empty.
-    rows : the n lines, and their numbers in the file.
+    fields : (n,) texts and numbers, NaN for an empty field.
+    rows : line number in the file, and text, of each of the n rows.
     is_comma : whether numbers have decimal commas.
 
     Returns
     -------
     ndarray or LeftOut
-        (n,) numbers; or the first field that is no number.
+        (n,) the numbers; or a `LeftOut` that names the first field that is no number.
     """
     numbers = np.empty(len(fields))
     for i, field in enumerate(fields):
@@ -1010,25 +1067,27 @@ def _numbers_of_texts(
 def _names(
     source: str, head: Sequence[str], width: int, divider: str | None
 ) -> list[tuple[str, str]]:
-    """Return name and unit of each column from the last one or two lines above the numbers.
+    """Return the name and unit of each column from the lines above the numbers.
+
+    The last line has the names, or it has the units and the line above it has the names. The last
+    name may be missing, unless the numbers are separated by blanks.
 
     Parameters
     ----------
-    source : what messages call the file.
+    source : name of the file in messages.
     head : lines above the numbers.
     width : number of columns.
-    divider : what divides the numbers, None for blanks; the names may be divided otherwise.
+    divider : separator of the numbers, None for blanks. The names may have another separator.
 
     Raises
     ------
     InputError
-        If there is no line above the numbers, or the number of names is not that of the columns;
-        the last name may be missing unless blanks divide the columns.
+        If there is no line above the numbers, or the number of names is not the number of columns.
     """
     if not head:
         allowed = "a line such as: time [s],rotor [rad]"
         raise InputError(f"{source}: no header line above the numbers; allowed: {allowed}")
-    # Below the names there may be another comment.
+    # There may be another comment between the names and the numbers; it is left out.
     while len(head) > 1 and len(_words(head[-1], divider, width)) not in (width, width - 1):
         if len(_words(head[-2], divider, width)) != width:
             break
@@ -1050,7 +1109,15 @@ def _names(
 
 
 def _words(line: str, divider: str | None, width: int) -> list[str]:
-    """Return the names in a line of the head, divided as the numbers are or otherwise."""
+    """Split a line above the numbers into names.
+
+    Parameters
+    ----------
+    line : the line.
+    divider : separator of the numbers, None for blanks. If it does not give the right number of
+        names, other separators are tried.
+    width : number of columns.
+    """
     words = _fields(line, divider)
     if len(words) in (width, width - 1) and divider is not None:
         return words
@@ -1062,7 +1129,7 @@ def _words(line: str, divider: str | None, width: int) -> list[str]:
 
 
 def _names_with_units(line: str) -> list[str]:
-    """Return the names of a line such as "time [s] pitch 1 rate [rad/s]", with their units."""
+    """Return the names, with units, in a line such as "time [s] pitch 1 rate [rad/s]"."""
     names = []
     for part in line.replace(")", "]").split("]")[:-1]:
         name, _, unit = part.replace("(", "[").partition("[")

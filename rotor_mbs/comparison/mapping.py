@@ -53,8 +53,8 @@ class ColumnMapping:
         channel's SI unit.
     sign : 1 or -1.
     offset : number that is added to the column, in the column's unit.
-    wrapped : whether the angle starts again from its first value after each turn. Jumps of more
-        than half a turn are then removed.
+    wrapped : whether whole turns are missing from the angle. Jumps of more than half a turn are
+        then removed.
     frame : frame of a load's components; "" for the frame of the scene's loads.
     """
 
@@ -173,7 +173,8 @@ class FoundChannels:
     ----------
     sources : the source of each channel, with its unit; the time or speed is first.
     lines : a line for each channel that states its source.
-    unused : for every other column, by its name, the reason why it is not compared.
+    unused : for every other column or part of a file, by its name, the reason why it is not
+        compared.
     loads_left_out : names of loads that the names of columns suggest, but that are neither compared
         nor omitted by the mapping.
     """
@@ -489,7 +490,7 @@ def _is_motion_or_mode(channel: Channel, first: Channel) -> bool:
 
 
 def _is_one_of(channel: Channel, names: Sequence[str]) -> bool:
-    """Return whether names have a channel, its load, or its kind of frequency.
+    """Return whether a list of names contains a channel, its load, or its kind of frequency.
 
     Parameters
     ----------

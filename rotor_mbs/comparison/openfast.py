@@ -1,8 +1,8 @@
-"""Columns of OpenFAST's output: which channel each is, in which sign, frame and zero.
+"""Recognize the columns of OpenFAST's output as channels, with their sign, frame and zero.
 
-OpenFAST's x (downwind), y, z are a scene's y, -x, z. Its pitch is positive towards feather, about
-the negative pitch axis; its loads are those of a blade on the hub and of the rotor on the shaft,
-the opposite of a scene's.
+OpenFAST's axes x (downwind), y, z are the axes y, -x, z of a scene. OpenFAST's pitch is positive
+towards feather, which is a rotation about the negative pitch axis. OpenFAST's loads are exerted by
+a blade on the hub, and by the rotor on the shaft; a scene's loads are the opposite.
 """
 
 from __future__ import annotations
@@ -21,19 +21,22 @@ from rotor_mbs.scenario.keys import file_key
 from rotor_mbs.scenario.scene import Scene
 
 PROGRAM = "openfast"
-# Where a table states no unit, as one that was converted may. The rotor's rate is in rpm.
+# Units that are taken if the table states none, as may be the case after a conversion of the file.
+# The rotor's rate is in rpm instead.
 _UNITS = {"time": "s", "angle": "deg", "rate": "deg/s", "force": "kN", "moment": "kN m"}
 _AZIMUTH = ("azimuth", "lsstipp", "lsstippxa", "lsstippxs")
 _SPEED = ("rotspeed", "lsstipv", "lsstipvxa", "lsstipvxs")
 _PITCH = re.compile(r"(?:bldpitch|blpitch|ptchpmzc|ptchpmzb)(\d+)")
 _PITCH_RATE = re.compile(r"bldprate(\d+)")
-# Other names of moments at the blade roots: in and out of the rotor's plane, edge- and flapwise.
+# Other names of moments at the blade roots: in-plane, out-of-plane, edgewise and flapwise, and the
+# standard names for them.
 _ROOT_MOMENT = re.compile(r"rootm(ip|oop|edg|flp)(\d+)")
 _ROOT_AXES = {"ip": "rootmxc", "oop": "rootmyc", "edg": "rootmxb", "flp": "rootmyb"}
-# Loads of rotor and hub on the shaft: OpenFAST's axis, and whether the axes turn with the shaft (a)
-# or not (s); the axis along the shaft is the same in both.
+# Loads that rotor and hub exert on the shaft. The name has OpenFAST's axis, then "a" if the axes
+# turn with the shaft, or "s" if they do not. The axis along the shaft is the same for both.
 _SHAFT = re.compile(r"(?P<load>lsshftf|lsstipm)(?P<axis>[xyz])(?P<frame>[as])")
 _SHAFT_AXES = {"x": ("y", -1), "y": ("x", 1), "z": ("z", -1)}
+# Names of columns that are not compared, and the reasons.
 _REASONS = (
     (
         re.compile(r"rottorq|lsshfttq|lsshftmx[as]|lsstipmx[as]|rotpwr"),
@@ -48,12 +51,12 @@ _REASONS = (
 
 @dataclass(frozen=True)
 class OpenFastSettings:
-    """Numbers of a model that its output needs, by OpenFAST's names.
+    """Numbers of an OpenFAST model that are needed to read its output.
 
     Attributes
     ----------
-    azimuth_up : azimuth at which blade 1 points up, degrees.
-    hub_centre : distance of the hub's mass from the apex, m downwind.
+    azimuth_up : azimuth at which blade 1 points up, deg.
+    hub_centre : distance of the hub's centre of mass from the apex, m, positive downwind.
     undersling : distance of the apex from the teeter pin, m.
     """
 
@@ -63,15 +66,16 @@ class OpenFastSettings:
 
 
 class Suggestion(NamedTuple):
-    """The channel that a column is: channel = sign * (column + offset).
+    """A channel and its column: channel = sign * (column + offset).
 
     Attributes
     ----------
-    channel, column : the channel, and the name of the column.
+    channel : the channel.
+    column : name of the column.
     sign : 1 or -1.
-    offset : in the unit of the column.
-    unit : of the column, "" for the one that the file states.
-    wrapped : whether whole turns are missing.
+    offset : number that is added to the column, in the column's unit.
+    unit : unit of the column; "" for the unit that the file states.
+    wrapped : whether whole turns are missing from the angle.
     """
 
     channel: Channel
@@ -83,12 +87,12 @@ class Suggestion(NamedTuple):
 
 
 def describe(settings: OpenFastSettings, *, is_guessed: bool) -> str:
-    """Return a line that says how the columns of OpenFAST's output are read.
+    """Return a line for the user that says how the columns of OpenFAST's output are read.
 
     Parameters
     ----------
     settings : numbers of the model.
-    is_guessed : whether the head of the file says that OpenFAST wrote it, not a mapping.
+    is_guessed : True if the head of the file says that OpenFAST wrote it; False if a mapping does.
     """
     source = "by its head" if is_guessed else "by the mapping"
     zero = f" less AzimB1Up = {settings.azimuth_up:g} deg" if settings.azimuth_up else ""
@@ -104,20 +108,20 @@ def suggested(
     scene: Scene,
     settings: OpenFastSettings,
 ) -> tuple[list[Suggestion], dict[str, str]]:
-    """Return which channels the columns of OpenFAST's output are.
+    """Find the channels that the columns of OpenFAST's output are.
 
     Parameters
     ----------
     table : the columns.
     known : `channels` of the scene.
-    scene : the rotor, whose hub and tilt decide about the loads of the shaft.
+    scene : the rotor. Its hub, tilt and number of blades matter for the loads of the shaft.
     settings : numbers of the model.
 
     Returns
     -------
     list of Suggestion, dict
-        One suggestion for each channel that is found, by the first column that has it; by name of
-        other columns whose names are known, why they are not compared.
+        A suggestion for each channel that is found, with the first column for this channel; the
+        reasons, by name of the column, why other columns with known names are not compared.
     """
     found: dict[str, Suggestion] = {}
     reasons: dict[str, str] = {}
@@ -155,13 +159,13 @@ def _suggestion(
     known: Sequence[Channel],
     settings: OpenFastSettings,
 ) -> Suggestion | None:
-    """Return the channel that a column's name says, None for an unknown name.
+    """Return the channel that a column's name means, None for an unknown name.
 
     Parameters
     ----------
-    name, plain : of the column, as it stands in the file and in lower case.
+    name, plain : name of the column as in the file, and in lower case without "_" at its ends.
     known : `channels` of the scene.
-    settings : numbers of the model, of which the azimuth's zero counts.
+    settings : numbers of the model. Only the zero of the azimuth is used.
     """
     by_name = {channel.name: channel for channel in known}
     if plain in _AZIMUTH:
@@ -184,7 +188,7 @@ def _suggestion(
         if channel is None or not channel.is_load:
             return None
         if standard.rstrip("0123456789").endswith("c"):
-            # Axes that do not pitch: those of the coned blade.
+            # The axes "c" do not turn with the pitch; their frame is "coned".
             own = by_name[channel.name.partition(",")[0]]
             sign = channel.sign
             return Suggestion(_in_frame(own, ("coned", "rotor")), name, sign)
@@ -193,7 +197,14 @@ def _suggestion(
 
 
 def _shaft_load(name: str, match: re.Match[str], by_name: Mapping[str, Channel]) -> Suggestion:
-    """Return the load of the shaft that a column's name says."""
+    """Return the load of the shaft that a column's name means.
+
+    Parameters
+    ----------
+    name : name of the column.
+    match : match of the name with `_SHAFT`.
+    by_name : `channels` of the scene by name.
+    """
     axis, sign = _SHAFT_AXES[match["axis"]]
     kind = "force" if match["load"] == "lsshftf" else "moment"
     frames = ("rotor",) if match["frame"] == "a" and axis != "y" else ("shaft", "base")
@@ -201,7 +212,13 @@ def _shaft_load(name: str, match: re.Match[str], by_name: Mapping[str, Channel])
 
 
 def _in_frame(channel: Channel, frames: Iterable[str]) -> Channel:
-    """Return a load in the first of some frames in which it has components."""
+    """Return a load's component in the first of some frames that are possible for the load.
+
+    Parameters
+    ----------
+    channel : the component in the frame of the scene's loads; returned if no frame is possible.
+    frames : the frames, the preferred one first.
+    """
     own = channel.own_frame
     for frame in frames:
         if frame == own or frame in FRAMES.get(own, ()):
@@ -210,26 +227,27 @@ def _in_frame(channel: Channel, frames: Iterable[str]) -> Channel:
 
 
 def _is_about_pin(channel: Channel, scene: Scene, settings: OpenFastSettings) -> bool:
-    """Return whether a moment is about the teeter pin, away from the apex."""
+    """Return whether a channel is a shaft moment about a teeter pin that is not at the apex."""
     is_shaft_moment = channel.name.startswith("shaft moment")
     return is_shaft_moment and len(scene.blades) == 2 and settings.undersling != 0.0
 
 
 def _hub_offset(channel: Channel, scene: Scene, settings: OpenFastSettings) -> float:
-    """Return the correction of a shaft moment, N m, for the place of the hub's weight.
+    """Return the correction of a shaft moment, N m, for the position of the hub's weight.
 
-    OpenFAST's hub has its weight at HubCM, a scene's at the apex.
+    The weight of the hub acts at HubCM in OpenFAST, and at the apex in a scene.
 
     Parameters
     ----------
-    channel : a load; 0 for all but the moments of the shaft.
+    channel : the channel. The correction is 0 unless it is a moment of the shaft.
     scene : the rotor, with mass of the hub, gravity and tilt.
     settings : numbers of the model.
 
     Returns
     -------
     float
-        To be added to the column; NaN in axes that turn, where it changes with the azimuth.
+        The number to be added to the column. NaN in axes that turn with the rotor, in which the
+        correction changes with the azimuth.
     """
     if not channel.name.startswith("shaft moment") or not settings.hub_centre * scene.hub_mass:
         return 0.0
