@@ -105,7 +105,7 @@ class ColumnReadings:
         with_factor: bool,
     ) -> None:
         self.data = data
-        self._begin = int(np.searchsorted(data.time, 0.0))  # rows before it have no reference
+        self._begin = int(np.searchsorted(data.time, 0.0))  # before t = 0 there is no reference
         self._rows = slice(self._begin, self._begin + len(states))
         self._states, self._carried, self._states_at = states, carried, states_at
         self.allowed, self._tolerance = allowed, tolerance
@@ -308,8 +308,8 @@ class ColumnReadings:
             return Reading(text, math.inf, None, rounding)
         rounding_here = FLOOR_SAFETY * rounding[self._rows]
         left = self._left(j, expected, values, rounding_here)
-        # The uncorrected column has to be wrong in the same rows. Otherwise nothing may move in
-        # these rows, and then any reading fits.
+        # The uncorrected column has to be wrong in the same rows. If nothing moves in these rows,
+        # any reading fits, and then none is accepted.
         is_known = np.isfinite(expected)
         as_it_is = np.where(is_known, self._expected(j), np.nan)
         if not left < _FAR_LESS * self._left(j, as_it_is, values, rounding_here):

@@ -49,8 +49,8 @@ class LeftOut(NamedTuple):
     Attributes
     ----------
     reason : the reason in words, "row 3 has 'x', no number".
-    is_column : whether the part is a column of values that are no numbers. Such a column may have
-        been intended as a channel; then it is refused.
+    is_column : whether the part is a column, but of values that are no numbers. If such a column
+        has the name of a channel, the data are refused.
     """
 
     reason: str

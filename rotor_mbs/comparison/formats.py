@@ -87,7 +87,7 @@ _FORTRAN = re.compile(r"(?<=[\d.])[dD](?=[+-]?\d)")  # 1.5D-03
 _FORTRAN_3_DIGITS = re.compile(r"(?<=[\d.])(?=[+-]\d{3}$)")
 # Texts that programs write in place of a missing number. The first row of numbers may have them.
 _MISSING = re.compile(r"\*+|-+|\?|#?n/?a!?|null|none|missing|nil", re.IGNORECASE)
-_MAX_SEARCHED = 200  # largest number of lines that are searched for a header of special tables
+_MAX_SEARCHED = 200  # largest number of lines searched for a header above texts or vectors
 
 Arrays = Mapping[str, Any]
 Units = Mapping[str, str]
@@ -293,7 +293,7 @@ def _matlab(path: Path, *, is_hdf5: bool) -> Arrays:
     RotorError
         If the file is damaged, or its arrays claim more than `MAX_BYTES`.
     """
-    from pymatreader import read_mat  # late: 0.2 s
+    from pymatreader import read_mat  # imported here, as it takes 0.2 s
     from scipy.io import whosmat
 
     if is_hdf5:
@@ -443,7 +443,7 @@ def _hdf5(path: Path, group: str, scene: str) -> DataTable:
         If the file cannot be read, its arrays claim more than `MAX_BYTES`, or it has the layout of
         pandas' `to_hdf`.
     """
-    from rotor_mbs.runs import arrays as hdf5_arrays  # late: 0.2 s
+    from rotor_mbs.runs import arrays as hdf5_arrays  # imported here, as it takes 0.2 s
     from rotor_mbs.runs.design import RUNS
     from rotor_mbs.runs.read import run_arrays
     from rotor_mbs.runs.table import TableFile
@@ -485,7 +485,7 @@ def _decoded(source: str, arrays: Arrays, attributes: Mapping[str, Mapping[str, 
     InputError
         See `table_of`.
     """
-    import xarray as xr  # late: 0.4 s
+    import xarray as xr  # imported here, as it takes 0.4 s
 
     variables = {}
     units: dict[str, str] = {}
@@ -597,7 +597,7 @@ def _json(text: str) -> tuple[Arrays, Units]:
     ValueError
         If the text is no JSON, or is a list with elements other than objects.
     """
-    import pandas as pd  # late: 0.3 s
+    import pandas as pd  # imported here, as it takes 0.3 s
 
     try:
         content = json.loads(text)
@@ -960,7 +960,7 @@ def _columns_of_rows(
         If a line has another number of fields than the first line, or there are more than
         `MAX_COLUMNS` columns.
     """
-    import pandas as pd  # late: 0.3 s
+    import pandas as pd  # imported here, as it takes 0.3 s
 
     width = len(_fields(rows[0][1], divider))
     if width > MAX_COLUMNS:
