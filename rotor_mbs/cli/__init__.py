@@ -1,7 +1,7 @@
 """Run a command of the command line, and turn errors and interrupts into its exit status.
 
-Control characters in standard output and standard error are escaped, as a title or a message that
-comes from a file may contain escape sequences. A closed standard error does not end a command.
+Control characters in standard output and standard error are escaped, because a title or a message
+from a file may contain escape sequences. A closed standard error does not end a command.
 """
 
 from __future__ import annotations
@@ -34,11 +34,11 @@ if TYPE_CHECKING:
     import argparse
 
 EXIT_OK, EXIT_FAILED, EXIT_BAD_INPUT, EXIT_INTERRUPTED = 0, 1, 2, 130
-# Commands that only print: if the reader closes the pipe (`rotor-mbs list | head`), this is no
-# failure.
+# Commands that only print. They do not fail if the reader closes the pipe, as in
+# `rotor-mbs list | head`.
 _ONLY_PRINT = ("list", "show")
 
-_received_signals: list[int] = []  # those that have interrupted the current call
+_received_signals: list[int] = []  # numbers of the signals that interrupted this call
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -46,7 +46,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     Parameters
     ----------
-    argv : the words after `rotor-mbs`; by default those of this process.
+    argv : the words after `rotor-mbs`; by default those with which this process was started.
 
     Returns
     -------
@@ -55,12 +55,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     if argv is not None:
         return _run(list(argv))
-    # With PYTHONINSPECT, Python would show the exit as a traceback and wait for input at the end,
-    # also in worker processes, which inherit the variable.
+    # If PYTHONINSPECT is set, Python shows a SystemExit as a traceback, and waits for input before
+    # it ends. Worker processes, which inherit the variable, would do the same.
     is_inspected = bool(os.environ.pop("PYTHONINSPECT", ""))
     try:
         status = _run(sys.argv[1:])
-    except SystemExit as exc:  # of the argument parser
+    except SystemExit as exc:  # raised by the argument parser
         if not is_inspected:
             raise
         status = exc.code if isinstance(exc.code, int) else EXIT_OK
@@ -70,7 +70,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _end_process(status: int) -> NoReturn:
-    """End this process without a SystemExit, after its exit functions have run."""
+    """Run the exit functions of this process, and end it without a SystemExit."""
     atexit._run_exitfuncs()
     for stream in (sys.stdout, sys.stderr):
         with suppress(AttributeError, OSError, ValueError):
@@ -90,18 +90,18 @@ def _run(words: list[str]) -> int:
             with _signals_as_interrupts(), warnings.catch_warnings(), system_errors_apart():
                 warnings.simplefilter("always", PlausibilityWarning)
                 warnings.showwarning = _print_warning
-                # Imported in this block: an interrupt, or a lack of memory, during the import is
-                # handled like one during the command.
+                # These functions are imported inside the `try` block: an interrupt or a lack of
+                # memory during the import is then handled as if it occurred during the command.
                 from rotor_mbs.cli.arguments import load_methods, parse
 
                 arguments = parse(words)
                 load_methods(arguments)
                 _prepare_reading(arguments)
-                # `command` is "module:function", see `parse`.
+                # `arguments.command` is "module:function", see `parse`.
                 module, _, function = arguments.command.partition(":")
                 command = getattr(importlib.import_module(f"rotor_mbs.cli.{module}"), function)
                 status = int(command(arguments))
-            # What is still in the buffer may fail, too.
+            # Writing the rest of the buffer may fail, too.
             sys.stdout.flush()
             if isinstance(sys.stdout, PlainStream) and sys.stdout.failure is not None:
                 raise sys.stdout.failure
@@ -132,13 +132,15 @@ def _run(words: list[str]) -> int:
 
 
 def _prepare_reading(arguments: argparse.Namespace) -> None:
-    """Start the reading process of `runs.untrusted` if an argument names a file of this program.
+    """Start the worker process of `runs.untrusted` if an argument names a file of this program.
 
-    It loads its code while this process loads that of the command.
+    The worker process reads the file. It loads its code while this process loads the code of the
+    command.
 
     Parameters
     ----------
-    arguments : of a command; `file` or `scene` may name such a file.
+    arguments : parsed arguments of a command. `file` or `scene` may name a file that this program
+        wrote.
     """
     name = getattr(arguments, "file", None) or getattr(arguments, "scene", None)
     if not isinstance(name, str | os.PathLike):
@@ -156,7 +158,7 @@ def _prepare_reading(arguments: argparse.Namespace) -> None:
 def _without_invalid_date() -> Iterator[None]:
     """Remove a SOURCE_DATE_EPOCH that is not a number from the environment in the block.
 
-    With it, SciPy and a part of NumPy cannot be imported.
+    SciPy and a part of NumPy cannot be imported while the variable has such a value.
     """
     date = os.environ.get("SOURCE_DATE_EPOCH")
     if date is None or date.isdecimal():
@@ -172,7 +174,8 @@ def _without_invalid_date() -> Iterator[None]:
 def _print_warning(message: Warning | str, category: type[Warning], *where: Any, **_: Any) -> None:
     """Print a warning: a PlausibilityWarning in one line, others as Python shows them.
 
-    It has the parameters of `warnings.showwarning`; `where` begins with file name and line number.
+    The parameters are those of `warnings.showwarning`; `where` begins with the file name and the
+    line number.
     """
     if issubclass(category, PlausibilityWarning):
         text = f"warning: {message}"
@@ -184,8 +187,8 @@ def _print_warning(message: Warning | str, category: type[Warning], *where: Any,
 def _is_interrupt(error: BaseException) -> bool:
     """Return whether an error was caused by an interrupt.
 
-    An interrupt inside compiled code or during an import may arrive as another error, with or
-    without the interrupt as its cause.
+    An interrupt inside compiled code or during an import may raise another error. The
+    KeyboardInterrupt may or may not be the cause of that error.
     """
     cause: BaseException | None = error
     while cause is not None:
@@ -196,12 +199,12 @@ def _is_interrupt(error: BaseException) -> bool:
 
 
 def _signal_main_thread(number: signal.Signals) -> None:
-    """Send a signal to the main thread, and break off its system call, such as a sleep."""
+    """Send a signal to the main thread, which also breaks off a system call such as a sleep."""
     if not callable(signal.getsignal(number)):
-        return  # the command has ended: the default action of the signal would end its caller
+        return  # the handler is removed after the command: now the signal would end the process
     if hasattr(signal, "pthread_kill"):
         main_thread_id = threading.main_thread().ident
-        assert main_thread_id is not None  # it has started
+        assert main_thread_id is not None  # None only before a thread starts
         signal.pthread_kill(main_thread_id, number)
     else:  # Windows: a system call of the main thread is not broken off
         _thread.interrupt_main(number)
@@ -222,9 +225,9 @@ def _signals_as_interrupts() -> Iterator[None]:
         raise KeyboardInterrupt
 
     def interrupt_again(unraisable: sys.UnraisableHookArgs) -> None:
-        """Repeat an interrupt a moment later if Python ignored it.
+        """Send the signal of an interrupt again after 10 ms if Python ignored the exception.
 
-        Python ignores exceptions in a weak reference's callback, for example.
+        For example, Python ignores exceptions in the callback of a weak reference.
         """
         if isinstance(unraisable.exc_value, KeyboardInterrupt):
             number = signal.SIGINT
@@ -239,8 +242,8 @@ def _signals_as_interrupts() -> Iterator[None]:
     _received_signals.clear()
     handlers = {}
     for name in ("SIGINT", "SIGTERM", "SIGHUP"):
-        number = getattr(signal, name, None)  # SIGHUP: not on Windows
-        # A signal that is ignored (nohup) stays so.
+        number = getattr(signal, name, None)  # Windows has no SIGHUP
+        # A signal that is ignored, as SIGHUP is under nohup, stays ignored.
         if number is not None and signal.getsignal(number) in (
             signal.SIG_DFL,
             signal.default_int_handler,
@@ -259,9 +262,10 @@ class PlainStream:
 
     Attributes
     ----------
-    unfiltered : the stream that is written to.
-    failure : the first error in writing, such as BrokenPipeError. Later text is dropped, so that a
-        command completes its work and ends with this error.
+    unfiltered : the stream to which the text is written.
+    failure : the first error in writing, such as BrokenPipeError, or None. All text after this
+        error is dropped without another error. The command thus completes its work, and afterwards
+        `_run` raises the failure of standard output.
     """
 
     def __init__(self, stream: TextIO) -> None:
@@ -274,7 +278,7 @@ class PlainStream:
         return len(text)
 
     def write_unfiltered(self, text: str) -> None:
-        """Write a text as it is."""
+        """Write a text without escaping its control characters."""
         with self._kept_failure():
             self.unfiltered.write(text)
 
@@ -285,7 +289,7 @@ class PlainStream:
 
     @contextmanager
     def _kept_failure(self) -> Iterator[None]:
-        """Note the first OSError of the block in `failure`, and drop all that is written later."""
+        """Store the first OSError of the block in `failure`, and drop all text after it."""
         try:
             yield
         except OSError as exc:
@@ -298,10 +302,10 @@ class PlainStream:
 
 @contextmanager
 def plain_streams() -> Iterator[None]:
-    """Replace standard output and standard error in the block by plain streams.
+    """Replace standard output and standard error in the block by PlainStream objects.
 
-    A closed stream is replaced by the null device. What the encoding cannot express, such as ° in
-    ASCII, is written as its escape.
+    A closed stream is replaced by the null device. A character that the stream's encoding lacks,
+    such as ° in ASCII, is written as an escape.
     """
     with open(os.devnull, "w") as null, ExitStack() as stack:  # noqa: PTH123  (a device)
         for redirect, stream in ((redirect_stdout, sys.stdout), (redirect_stderr, sys.stderr)):
@@ -313,7 +317,7 @@ def plain_streams() -> Iterator[None]:
 
 
 def print_line(text: str, stream: TextIO) -> None:
-    """Print a line, and ignore a failure: a closed stream, or a full disk."""
+    """Print a line, and ignore errors such as a closed stream or a full disk."""
     with suppress(OSError, ValueError):
         print(text, file=stream, flush=True)
 
@@ -321,7 +325,8 @@ def print_line(text: str, stream: TextIO) -> None:
 def discard_output(stream: TextIO) -> None:
     """Redirect a stream to the null device after a failed write.
 
-    What is still in its buffer would fail again when the interpreter ends.
+    Without this, the interpreter would fail again when it ends, as it then writes the text that is
+    left in the stream's buffer.
     """
     with suppress(OSError, ValueError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())

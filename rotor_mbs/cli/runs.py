@@ -24,12 +24,13 @@ from rotor_mbs.studies.run import run_scenes
 def run(arguments: argparse.Namespace) -> int:
     """Run scenes with methods, and print a table of the runs and a summary.
 
-    The methods are those named with -m, else those in a scene's file, else they are selected by a
-    rule.
+    If methods are named with -m, these run; otherwise those that a scene's file names; otherwise
+    methods that a rule selects for the scene.
 
     Parameters
     ----------
-    arguments : `scenes`, `method`, `set` (settings), `output`, `jobs`, and `timeout` of a run (s).
+    arguments : parsed arguments: `scenes`, `method`, `set` (settings), `output`, `jobs`, and
+        `timeout` (time limit of a run in s).
 
     Returns
     -------
@@ -39,7 +40,7 @@ def run(arguments: argparse.Namespace) -> int:
     Raises
     ------
     InputError
-        If no scene has a method that can run it.
+        If an argument or a scene file is invalid, or no scene has a method that can run it.
     """
     scenes = find_scenes(arguments.scenes, problems_of_scene)
     settings = dict(arguments.set or ())
@@ -63,20 +64,23 @@ def run(arguments: argparse.Namespace) -> int:
 def reproduce(arguments: argparse.Namespace) -> int:
     """Compute every scene of the paper, and write the report.
 
-    Nothing is done if the last call succeeded, and its inputs and the results file are unchanged
-    since then. The last call stored a digest over all of them, with which the present one is
-    compared (`studies.reproduce.made_from`).
+    Nothing is computed if the last call succeeded, all its output files exist, and neither its
+    inputs nor the results file have changed since then. To find changes, a call that succeeds
+    stores a digest of the inputs and the results file (`studies.reproduce.made_from`), and the next
+    call computes the digest again.
 
     Parameters
     ----------
-    arguments : `output` (folder), `jobs`, and `timeout` of a run (s).
+    arguments : parsed arguments: `output` (folder), `jobs`, and `timeout` (time limit of a run in
+        s).
 
     Returns
     -------
     int
-        The exit status of `print_summary`, or 0 if nothing had to be done.
+        The exit status of `print_summary`, or 0 if nothing had to be computed.
     """
-    # Imported here and in `_reproduce`, as it imports the benchmarks, which `run` does not need.
+    # `studies.reproduce` imports the benchmarks, which `run` does not need. It is therefore
+    # imported here and in `_reproduce`, not at the top of the file.
     from rotor_mbs.studies.reproduce import made_from
 
     start = time.monotonic()
@@ -93,7 +97,8 @@ def reproduce(arguments: argparse.Namespace) -> int:
     else:
         status, text = _reproduce(arguments, results, pages)
         replace_file(summary, text.encode(), rb"\A\s*(result|method) ")
-        # Written last, and only after success: without it the next call computes what is missing.
+        # The stamp is written last, and only after success. Without a stamp, the next call computes
+        # what is missing.
         if status == 0:
             replace_file(
                 stamp, made_from(results, arguments.timeout).encode(), rb"\A[0-9a-f]{64}\Z"
@@ -104,7 +109,10 @@ def reproduce(arguments: argparse.Namespace) -> int:
 
 
 def _reproduce(arguments: argparse.Namespace, results: Path, pages: Path) -> tuple[int, str]:
-    """Compute the runs, write the pages with the same processes, and return status and summary."""
+    """Compute the runs and write the pages, and return the exit status and the text of the summary.
+
+    The runs and the pages share one pool of processes.
+    """
     load_code = partial(import_module, "rotor_mbs.studies.reproduce")
     from rotor_mbs.studies.reproduce import reproduce as reproduce_paper
     from rotor_mbs.studies.reproduce import summary_of
@@ -113,14 +121,14 @@ def _reproduce(arguments: argparse.Namespace, results: Path, pages: Path) -> tup
         outcomes, refused = reproduce_paper(
             results, workers=pool, timeout_s=arguments.timeout, on_progress=progress
         )
-        from rotor_mbs.report.build import write_report  # late: `reproduce` alone needs it
+        from rotor_mbs.report.build import write_report  # only `reproduce` needs it
 
         write_report(results, pages, pool, partial(progress.stage, "pages and figures"))
     return print_summary(outcomes, results, refused), summary_of(results)
 
 
 def reference(arguments: argparse.Namespace) -> int:
-    """Compute the references of scenes, also where a reference is shipped."""
+    """Compute the references of scenes, even if a reference is shipped, and print a summary."""
     scenes = find_scenes(arguments.scenes)
     with ProgressLine() as progress:
         outcomes = run_scenes(

@@ -1,4 +1,4 @@
-"""Print what several commands have in common: tables, JSON, the summary of runs."""
+"""Print the output that several commands have in common: tables, JSON, the summary of runs."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from rotor_mbs.runs.progress import coloured
 from rotor_mbs.scenario.keys import counted
 from rotor_mbs.solution.status import REFUSED
 
-if TYPE_CHECKING:  # not loaded here: a sweep's workers start before these are imported
+if TYPE_CHECKING:  # a sweep starts its workers before it imports these modules
     from rotor_mbs.analysis.text_tables import TextTable
     from rotor_mbs.runs.runner import RunOutcome
 
@@ -25,10 +25,10 @@ if TYPE_CHECKING:  # not loaded here: a sweep's workers start before these are i
 def print_table(table: TextTable | str) -> None:
     """Print a table on standard output after an empty line, unless it has no rows.
 
-    On a terminal its statuses are coloured.
+    On a terminal, the statuses in the table are coloured.
     """
     if isinstance(table, str) or table.rows:
-        # Colours are control characters, which the stream would escape.
+        # Colours are control characters. The stream's `write` would escape them.
         write = getattr(sys.stdout, "write_unfiltered", sys.stdout.write)
         write(f"\n{coloured(printable(str(table)), sys.stdout)}\n")
 
@@ -48,15 +48,16 @@ def print_summary(runs: Sequence[RunOutcome], output: Path, refused: Sequence[Re
 
     Parameters
     ----------
-    runs : what the call computed, or tried to, and what was stored already.
+    runs : outcomes of the runs that the call computed or tried to compute, and of the runs that
+        were stored before.
     output : the results file.
     refused : runs that were left out before the call began.
 
     Returns
     -------
     int
-        The exit status: 1 if a run that should succeed did not, or was not computed; 2 if the
-        methods refused all runs.
+        The exit status: 2 if methods were refused and nothing but references could run; otherwise
+        1 if a run failed that should succeed, or if `print_not_computed` returns True.
     """
     is_incomplete = print_not_computed(runs, refused)
     accepted = [run for run in runs if run.status != REFUSED]
@@ -83,20 +84,21 @@ def print_summary(runs: Sequence[RunOutcome], output: Path, refused: Sequence[Re
 
 
 def print_not_computed(made: Sequence[RunOutcome], refused: Sequence[Refusal] = ()) -> bool:
-    """Print a line for each run that was not computed.
+    """Print a line on standard error for each run that was not computed.
 
     Parameters
     ----------
-    made : what a call computed or tried to. A run is not computed if its method refused the scene
-        when its solver was built, if its process died or could not start, or if the reference of
-        its scene was not computed.
-    refused : runs that were left out before.
+    made : outcomes of the runs that a call computed or tried to compute. A run is not computed if
+        its method refuses the scene when the solver is built, if its process dies or cannot start,
+        or if the reference of its scene was not computed.
+    refused : runs that were left out before the call began.
 
     Returns
     -------
     bool
-        Whether one of the runs was asked for by name, or should be tried again: the exit status is
-        then not 0.
+        Whether the exit status must not be 0. This holds if a run should be tried again, was
+        refused when its solver was built, or was left out although the user named its method or
+        settings.
     """
     not_stored = [outcome for outcome in made if not outcome.is_stored]
     lost = [outcome for outcome in not_stored if outcome.status != REFUSED]
