@@ -18,28 +18,29 @@ from rotor_mbs.errors import InputError, nearest, shown_value
 from rotor_mbs.processes import MAX_WORKERS, cores
 from rotor_mbs.scenario.toml_file import file_path
 
-REPRODUCED = Path("rotor-mbs-out")  # where `reproduce` writes
+REPRODUCED = Path("rotor-mbs-out")  # default output folder of `reproduce`
 EXPORT_FORMATS = ("mjcf", "exudyn", "csv")
 
-_MIN_SPEED, _MAX_SPEED = 1e-25, 1e25  # rad/s, the limits of numbers in a scene
+_MIN_SPEED, _MAX_SPEED = 1e-25, 1e25  # rad/s, as for numbers in a scene
 _SPEED_UNITS = {"rad/s": 1.0, "rpm": math.pi / 30.0}
-_MAX_SPAN = 10_000  # numbers of FROM:TO:COUNT
-_MAX_NUMBER = 1e9  # largest count, and largest number of seconds (thirty years)
+_MAX_SPAN = 10_000  # largest COUNT in FROM:TO:COUNT
+_MAX_NUMBER = 1e9  # largest count, and largest time in s (thirty years)
 
 
 def default_results() -> Path:
     """Return the results file that is read if none is named.
 
-    It is that of `run` in this folder if there is one, otherwise that of `reproduce`.
+    It is `results.h5` in the current folder, the default output of `run`, if this file exists;
+    otherwise it is the default output of `reproduce`.
     """
     results = Path("results.h5")
     return results if results.exists() else REPRODUCED / results
 
 
 def pages_beside(results: Path) -> Path:
-    """Return the default folder for the pages of a file.
+    """Return the default folder for the pages that are made from a file.
 
-    It is `report` beside results.h5, x-report beside x.h5.
+    It is `report` beside results.h5, and `x-report` beside any other file x.h5.
     """
     return results.parent / ("report" if results.name == "results.h5" else f"{results.stem}-report")
 
@@ -79,7 +80,7 @@ def span(text: str, unit: str = "rad/s") -> tuple[float, ...]:
     Parameters
     ----------
     text : "FROM:TO:COUNT".
-    unit : of the numbers in the text, "rad/s" or "rpm".
+    unit : unit of the numbers in the text, "rad/s" or "rpm".
 
     Raises
     ------
@@ -95,10 +96,10 @@ def span(text: str, unit: str = "rad/s") -> tuple[float, ...]:
             numbers = []
             for i in range(count):
                 speed = first + (last - first) * i / (count - 1)
-                # 0 between a negative and a positive speed
+                # A speed at the change of sign is 0, without a rounding error.
                 numbers.append(0.0 if abs(speed) <= rounding else speed)
-            # A difference of a few units of rounding has fewer numbers than COUNT; 1e-320 has an
-            # infinite inverse.
+            # If FROM and TO differ by a few units of rounding only, there are fewer than COUNT
+            # different numbers between them. A speed such as 1e-320 has an infinite inverse.
             slowest = min(abs(speed) for speed in numbers if speed)
             if len(set(numbers)) == count and slowest >= _MIN_SPEED:
                 return tuple(numbers)
@@ -120,13 +121,13 @@ def span_in_rpm(text: str) -> tuple[float, ...]:
 
 
 def part(text: str) -> tuple[int, int]:
-    """Return (K, N) from "K/N"."""
+    """Return (K, N) from "K/N": part K of the N parts of a sweep."""
     number, _, parts = text.partition("/")
     try:
         are_whole = number.isdecimal() and parts.isdecimal()
         if are_whole and 1 <= int(number) <= int(parts) <= _MAX_NUMBER:
             return int(number), int(parts)
-    except ValueError:  # more than 4300 digits
+    except ValueError:  # Python does not convert more than 4300 digits
         pass
     raise _not_allowed(text, f"K/N with K from 1 to N, N at most {_MAX_NUMBER:g}")
 
@@ -152,8 +153,8 @@ def _positive(
     def read(text: str) -> float:
         try:
             value = kind(text)
-        except ValueError:  # no number, or a whole number of more than 4300 digits
-            value = kind(0)  # which is refused below
+        except ValueError:  # not a number, or a whole number of more than 4300 digits
+            value = kind(0)  # 0 is refused below
         if not 0 < value <= largest:
             raise _not_allowed(text, allowed)
         return value
@@ -168,12 +169,16 @@ POSITIVE = _positive(float, "a number more than 0, at most 1e9")
 
 
 class _Parser(argparse.ArgumentParser):
-    """An argument parser that reports bad usage in one line, without the usage before it."""
+    """An argument parser that reports an error in one line.
+
+    argparse itself prints a usage text before the error.
+    """
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
-        # No option begins with a digit, so whatever looks like "-1", also "-1e-6" or "-1:3:5", is a
-        # value; argparse itself takes only plain numbers for values.
+        # Of the words that begin with "-", argparse itself takes only plain numbers for values, and
+        # all others for options. Here, no option begins with a digit: "-1e-6" and "-1:3:5" are
+        # values, too.
         self._negative_number_matcher = re.compile(r"-\.?[0-9]")
 
     def error(self, message: str) -> NoReturn:
@@ -227,10 +232,10 @@ class _Parser(argparse.ArgumentParser):
 
 
 class _Names(argparse.Action):
-    """Print the names of columns that `compare` understands, and end, as --help does."""
+    """Print the column names that `compare` knows, and end the program, as --help does."""
 
     def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
-        # late: other commands need not wait for it
+        # imported late: other commands do not need it
         from rotor_mbs.analysis.text_tables import TextTable
         from rotor_mbs.comparison.channels import known_names
 
@@ -249,7 +254,8 @@ def parse(argv: Sequence[str]) -> argparse.Namespace:
     Returns
     -------
     argparse.Namespace
-        Its `command` names the function to call, "module:function".
+        The parsed arguments. Their `command` is the function to call, "module:function" in
+        `rotor_mbs.cli`.
     """
     parser, commands = _parser()
     if argv and not argv[0].startswith("-") and argv[0] not in commands:
@@ -267,13 +273,13 @@ def parse(argv: Sequence[str]) -> argparse.Namespace:
 
 
 def load_methods(arguments: argparse.Namespace) -> None:
-    """Replace Python files in the arguments by the names of their methods.
+    """Replace each Python file in the arguments by the names of the methods that it defines.
 
-    Raises InputError for methods that are unknown.
+    Raises InputError for an unknown method, and for a file that cannot be loaded.
     """
     given = [name for name in ("method", "methods") if name in arguments]
     if given:
-        # late: other commands need not wait for it
+        # imported late: other commands do not need it
         from rotor_mbs.methods.catalogue import check_names
 
         for name in given:
@@ -281,7 +287,7 @@ def load_methods(arguments: argparse.Namespace) -> None:
 
 
 def _parser() -> tuple[_Parser, dict[str, _Parser]]:
-    """Build the parser of the command line, each command with its options."""
+    """Return the parser of the command line, and the parsers of the commands by name."""
     formatter = argparse.RawDescriptionHelpFormatter
     parser = _Parser(
         prog="rotor-mbs",
@@ -300,14 +306,14 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
 
     def command(name: str, text: str, function: str, *examples: str) -> _Parser:
-        """Add a command.
+        """Add a command, and return its parser.
 
         Parameters
         ----------
-        name : of the command.
-        text : its description.
-        function : "module:function" in `rotor_mbs.cli`.
-        *examples : arguments that may follow the name.
+        name : name of the command.
+        text : description of the command.
+        function : function that performs the command, "module:function" in `rotor_mbs.cli`.
+        *examples : arguments for the examples in the help: each follows the name in one example.
         """
         lines = ["example:"]
         for example in examples:
@@ -429,7 +435,7 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     options.output(file, "FILE", Path("bench.h5"))
     text = "timed runs per point (default: %(default)s; at most 5 for runs over 0.5 s)"
     options.add_argument("--repeats", type=COUNT, default=20, metavar="N", help=text)
-    # At this default the paper's seventeen scenes take eight minutes.
+    # With this default, `bench` takes eight minutes for the paper's seventeen scenes.
     text = "time budget per scene in s (default: %(default)g)"
     options.add_argument("--budget", type=SECONDS, default=28.0, metavar="SECONDS", help=text)
 
@@ -567,7 +573,7 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     options.jobs()
     options.timeout(
         8.0, "; at least 120 for lagrange/taylor"
-    )  # many runs of the suite would reach any limit: with a short one it ends in minutes
+    )  # many runs of the suite reach any limit; with a short limit the suite takes minutes
 
     options = command(
         "modes",

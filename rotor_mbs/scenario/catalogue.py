@@ -1,4 +1,4 @@
-"""Find the scenes that are shipped, and those that the arguments of a command mean."""
+"""Find the shipped scenes, and the scenes that the arguments of a command name."""
 
 from __future__ import annotations
 
@@ -14,7 +14,8 @@ from rotor_mbs.scenario.toml_file import file_path, parse_toml, shown_path
 if TYPE_CHECKING:  # `rotor-mbs list` reads no scene
     from rotor_mbs.scenario.scene import Scene, SceneChange, ValuesCheck
 
-# Groups at the top of a results file that are not scenes: no scene may take such a name.
+# Names of the groups at the top of a results file that are not scenes. No scene may have one of
+# these names.
 RESERVED_GROUPS = (
     "bench",
     "claims",
@@ -27,20 +28,20 @@ RESERVED_GROUPS = (
 )
 
 _PACKAGE = Path(__file__).resolve().parents[1]
-# A wheel carries the folders inside the package; an editable install has them at the top of the
-# checkout.
+# The folder that contains `scenarios` and `reference`. In a wheel it is inside the package; in an
+# editable install it is the top of the checkout.
 _DATA = _PACKAGE / "_data" if (_PACKAGE / "_data").is_dir() else _PACKAGE.parent
 SCENARIOS = _DATA / "scenarios"  # the shipped scenes
 SWEEPS = SCENARIOS / "sweeps"  # the shipped sweeps: TOML files that vary a scene
-REFERENCES = _DATA / "reference"  # published numbers, errata, bounds, trajectories
+REFERENCES = _DATA / "reference"  # published numbers, errata, bounds, frozen trajectories
 for _folder in (SCENARIOS, REFERENCES):
     if not _folder.is_dir():
         raise RotorError(f"{_folder}: the folder is missing; install rotor_mbs again")
 
-# Ending of the names of column mapping files; every other TOML file in a folder is a scene.
+# Ending of the names of mapping files of columns. Every other TOML file in a folder is a scene.
 MAPPING_ENDING = ".columns.toml"
 _NO_MOTION = ("samples", "outputs")  # keys that change what is stored, not how the rotor moves
-_SHOWN_CHANGES = 3  # keys in the label of a changed scene
+_SHOWN_CHANGES = 3  # largest number of keys in the label of a changed scene
 
 _PIECE = r"[A-Za-z0-9_-][A-Za-z0-9._-]*"
 _NAME = re.compile(rf"{_PIECE}(?:/{_PIECE})*")
@@ -48,7 +49,7 @@ _NAME_RULE = "of the characters A-Z a-z 0-9 . _ -, with no dot in front"
 
 
 def natural_key(name: str) -> list[tuple[int, int, str]]:
-    """Return a sort key by which digits count as whole numbers: 1kNm, 10kNm, 50kNm, 100kNm."""
+    """Return a sort key that compares digits as whole numbers: 1kNm, 10kNm, 50kNm, 100kNm."""
     pieces = []
     for piece in re.findall(r"[0-9]+|[^0-9]+", name):
         is_number = piece.isascii() and piece.isdigit()
@@ -73,24 +74,24 @@ def list_sweeps() -> list[tuple[str, str]]:
 
 
 def find_scenes(arguments: Sequence[str], check: ValuesCheck | None = None) -> list[Scene]:
-    """Read the scenes that the arguments of a command mean.
+    """Read and return the scenes that the arguments of a command name.
 
     Parameters
     ----------
     arguments : names of scenes, folders, and paths of TOML files. A shipped name takes precedence
-        over a path; the user's own folder `paper` is written ./paper.
-    check : called with the values of each file, returns further problems of them.
+        over a path: a folder `paper` of the user must be given as ./paper.
+    check : (values of a scene file by field) -> further problems of these values.
 
     Returns
     -------
     list of Scene
-        In the order of the arguments, each once. The scene of a shipped file is called
-        `folder/stem`, any other by the stem of its file.
+        The scenes in the order of the arguments, each once. A scene is named `folder/stem` after a
+        shipped file, and `stem` after any other file.
 
     Raises
     ------
     InputError
-        With all errors of all arguments and files.
+        One error with the problems of all arguments and all files.
     """
     from rotor_mbs.scenario.scene import load_scene
 
@@ -108,11 +109,11 @@ def find_scenes(arguments: Sequence[str], check: ValuesCheck | None = None) -> l
     for path in paths:
         try:
             real = path.resolve()
-        except (OSError, RuntimeError, ValueError):  # links in a circle, a NUL in the name
+        except (OSError, RuntimeError, ValueError):  # links that form a circle, or a NUL in the name
             what = "cannot be resolved to a file; allowed: a readable TOML file"
             problems.append(f"{shown_path(path)}: {what}")
             continue
-        # A folder and a file in it, or a link, mean the same scene.
+        # The arguments may name a file twice: as a file and by its folder, or by a link.
         if real in seen:
             continue
         seen.add(real)
@@ -137,13 +138,13 @@ def _name_problem(
     by_name: Mapping[str, Path],
     shipped: Iterable[str],
 ) -> str:
-    """Return why a scene cannot be named after its file; "" where it can.
+    """Return why a scene cannot be named after its file, or "" if it can.
 
     Parameters
     ----------
     path : the scene's file.
     name : the name that the scene would have.
-    by_name : files of the call's other scenes, by name of the scene.
+    by_name : files of the scenes that were found before, by scene name.
     shipped : names of shipped scenes.
     """
     if name in by_name:
@@ -151,8 +152,8 @@ def _name_problem(
         return f"{clash}; allowed: different names"
     if not _NAME.fullmatch(name):
         return f"the file's name cannot name a scene; allowed: a name {_NAME_RULE}"
-    # In a results file the group `paper` contains those of its scenes, `paper/fig05` and others, so
-    # that no scene can be named `paper`.
+    # No scene can have the name of a shipped folder: in a results file, the group `paper` contains
+    # the groups of the scenes `paper/fig05` and others.
     is_folder = any(other.startswith(name + "/") for other in shipped)
     if name in RESERVED_GROUPS or is_folder:
         hint = ""
@@ -163,16 +164,16 @@ def _name_problem(
 
 
 def check_scene_name(path: Path) -> None:
-    """Raise InputError if no scene can be named after `path`, a file that need not exist."""
+    """Raise InputError if no scene can be named after the file `path`, which need not exist."""
     problem = _name_problem(path, path.stem, {}, _shipped())
     if problem:
         raise InputError(f"{shown_path(path)}: {problem}")
 
 
 def only_scene(argument: str) -> Scene:
-    """Return the one scene that an argument means.
+    """Return the single scene that an argument names.
 
-    Raises InputError if it means several, and for whatever `find_scenes` refuses.
+    Raises InputError if the argument names several scenes, or if `find_scenes` raises it.
     """
     scenes = find_scenes([argument])
     if len(scenes) != 1:
@@ -182,9 +183,10 @@ def only_scene(argument: str) -> Scene:
 
 
 def scene_of(given: Scene | str | os.PathLike[str]) -> Scene:
-    """Return the scene itself, or the one that a name or the path of a TOML file means.
+    """Return `given` if it is a scene, otherwise the scene that this name or path means.
 
-    Raises InputError if there is none, TypeError if `given` is neither a scene nor a text or path.
+    Raises InputError if there is no such scene, and TypeError if `given` is neither a scene nor a
+    name (text) nor a path.
     """
     from rotor_mbs.scenario.scene import Scene
 
@@ -192,7 +194,7 @@ def scene_of(given: Scene | str | os.PathLike[str]) -> Scene:
 
 
 def shipped_scene(name: str) -> Scene | None:
-    """Return the shipped scene of a name, or None; files of users are not read."""
+    """Return the shipped scene that is called `name`, or None; users' files are not read."""
     from rotor_mbs.scenario.scene import load_scene
 
     path = _shipped().get(name)
@@ -200,9 +202,9 @@ def shipped_scene(name: str) -> Scene | None:
 
 
 def changes_from_shipped(scene: Scene) -> list[SceneChange] | None:
-    """Return what differs from the shipped scene of the same name.
+    """Return the changes from the shipped scene of the same name to this scene.
 
-    None is returned if no shipped scene has this name.
+    Returns None if no shipped scene has this name.
     """
     from rotor_mbs.scenario.scene import scene_changes
 
@@ -211,9 +213,9 @@ def changes_from_shipped(scene: Scene) -> list[SceneChange] | None:
 
 
 def scene_label(scene: Scene) -> str:
-    """Return the name of a scene, with what was changed in a shipped one.
+    """Return the name of a scene, and the keys in which it differs from the shipped scene.
 
-    Samples and outputs are not changes of the motion, and not named.
+    The keys `samples` and `outputs` are left out, as they do not change the motion.
 
     Examples
     --------
@@ -225,7 +227,7 @@ def scene_label(scene: Scene) -> str:
 
 
 def label_with_changes(name: str, changes: Iterable[SceneChange]) -> str:
-    """Return the label of a scene, given what differs from the shipped one of its name."""
+    """Return the label of a scene from its name and its `changes_from_shipped`."""
     keys = [change.key for change in changes if change.path[0] not in _NO_MOTION]
     if not keys:
         return name
@@ -234,7 +236,7 @@ def label_with_changes(name: str, changes: Iterable[SceneChange]) -> str:
 
 
 def moves_as_shipped(changes: Iterable[SceneChange] | None) -> bool:
-    """Return whether a scene moves as the shipped one, given its `changes_from_shipped`."""
+    """Return whether a scene with these `changes_from_shipped` moves as the shipped scene."""
     return changes is not None and all(change.path[0] in _NO_MOTION for change in changes)
 
 
@@ -248,24 +250,25 @@ def _shipped() -> dict[str, Path]:
 
 
 def _title(path: Path) -> str:
-    """Return the title of a shipped file."""
+    """Return the title in a shipped scene or sweep file."""
     text = path.read_text(encoding="utf-8")
-    # The title stands before the first table; to parse the tables would take most of the time.
+    # The title stands before the first table. Parsing the tables would take most of the time.
     top = text.partition("\n[")[0]
     return str(parse_toml(top, str(path)).tables.get("title", ""))
 
 
 def _files(argument: str) -> list[Path]:
-    """Return the scene files that an argument of a command means.
+    """Return the scene files that an argument of a command names.
 
     Parameters
     ----------
-    argument : name of a shipped scene or folder, or path of a TOML file or a folder of such files.
+    argument : name of a shipped scene or folder, or path of a TOML file or of a folder of TOML
+        files.
 
     Raises
     ------
     InputError
-        If there are none.
+        If the argument names no scene file.
     """
     shipped = _shipped()
     if argument in shipped:
@@ -278,7 +281,7 @@ def _files(argument: str) -> list[Path]:
     try:
         is_folder = bool(argument) and path.is_dir()
         exists = bool(argument) and path.exists()
-    except (OSError, ValueError):  # a name too long for the file system, a NUL in it
+    except (OSError, ValueError):  # the name is too long for the file system, or has a NUL
         is_folder = exists = False
     if is_folder:
         files = sorted(path.glob("*.toml"), key=lambda path: natural_key(path.name))
