@@ -3,8 +3,8 @@ published paper.
 
 This is the Python API. Modules are loaded on first use.
 
-    scenes, scene, load      names of the shipped scenes; a shipped scene; a scene from a TOML file
-    scene_from_openfast      the scene of an OpenFAST model's rotor
+    scenes, scene, load      list the shipped scenes; read a shipped scene; read a TOML file
+    scene_from_openfast      make a scene of the rotor in an OpenFAST model
     run                      simulate a scene with one method (`Run`) or several (`Results`)
     sweep                    run a parameter study (`Results`)
     compare                  compare data of another program with a scene (`DataComparison`)
@@ -12,7 +12,7 @@ This is the Python API. Modules are loaded on first use.
     bench                    measure error against run time (`BenchCurves`)
     test_method              examine a method of one's own (`Checks`)
     export                   export a scene for MuJoCo or Exudyn, or its reference as CSV
-    modes                    natural frequencies, damping and mode shapes over rotor speed (`Modes`)
+    modes                    compute frequencies, damping, mode shapes over rotor speed (`Modes`)
     open                     open any file that the program wrote (`Results`, `Modes`, ...)
 
 Examples
@@ -24,7 +24,8 @@ Examples
 ('ok', (101, 4))
 """
 
-# what type checkers take for true; importing `typing` would cost as much as all else here
+# Type checkers take this name to be true. Importing it from `typing` would take as long as all
+# other code of this module.
 TYPE_CHECKING = False
 
 __version__ = "0.1.0"
@@ -77,7 +78,7 @@ __all__ = sorted(_HOME)
 
 
 def __getattr__(name: str) -> object:
-    """PEP 562: a public name is imported when it is first asked for."""
+    """Return a public name, and import its module on first use (PEP 562)."""
     import importlib
 
     if name not in _HOME:

@@ -1,4 +1,4 @@
-"""python -m rotor_mbs"""
+"""Run the command line by `python -m rotor_mbs`."""
 
 import sys
 

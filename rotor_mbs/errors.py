@@ -1,4 +1,7 @@
-"""Define the typed errors of the package; this module imports nothing else of it."""
+"""Define the error classes of the package, and functions that make text for messages.
+
+This module imports no other module of the package.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +25,7 @@ class InputError(RotorError):
 
     Attributes
     ----------
-    problems : the lines.
+    problems : the lines of the message.
     """
 
     def __init__(self, problems: str | Iterable[str]) -> None:
@@ -40,10 +43,11 @@ class MethodRefusal(RotorError):
 
 
 class ResourceError(RotorError):
-    """Raised if the system lacks memory, processes or open files, independently of the run."""
+    """Raised if the system lacks memory, processes or open files; the run is not the cause."""
 
 
-# What the system lacks: an error of these is no result of a run.
+# Errors that are raised if the system lacks something: memory, a file, a library. Such an error is
+# not a result of a run.
 SYSTEM_ERRORS = (MemoryError, OSError, ImportError, ResourceError)
 
 
@@ -60,16 +64,15 @@ class PlausibilityWarning(UserWarning):
 
 @contextmanager
 def system_errors_apart(*others: type[Exception]) -> Iterator[None]:
-    """Raise one of SYSTEM_ERRORS for every error in the block that the system causes.
+    """Replace every error in the block that the system causes by one of SYSTEM_ERRORS.
 
-    A library that cannot be loaded may raise any error (NumPy a ValueError for an invalid
-    SOURCE_DATE_EPOCH), and an engine may replace an error of the system by one of its own. Neither
-    says anything of the run.
+    A library that cannot be loaded may raise an error of any type. For example, NumPy raises
+    ValueError for an invalid SOURCE_DATE_EPOCH. An engine may replace a system error by an error of
+    its own type. In both cases the error says nothing about the run.
 
     Parameters
     ----------
-    *others : types of errors that may be raised at any point, also during an import, and are passed
-        on unchanged.
+    *others : types of errors that are passed on unchanged, even if raised during an import.
 
     Raises
     ------
@@ -94,7 +97,7 @@ def system_errors_apart(*others: type[Exception]) -> Iterator[None]:
 def _was_importing(error: BaseException) -> bool:
     """Return whether an error passed through the code of a module that was being imported."""
     for frame, _ in traceback.walk_tb(error.__traceback__):
-        # Code that `exec` runs has this name, too, but not the module's file.
+        # Code that `exec` runs has the name <module>, too, but usually not the module's file name.
         if frame.f_code.co_name == "<module>" and frame.f_code.co_filename == frame.f_globals.get(
             "__file__"
         ):
@@ -111,7 +114,8 @@ def shown_value(value: object) -> str:
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
-# C0 but for tab and line feed, DEL, C1, and the marks that change the direction of writing.
+# Codes of the control characters (C0, DEL and C1) and of the marks that change the direction of
+# writing.
 _CONTROLS = (
     *range(0x20),
     *range(0x7F, 0xA0),
@@ -123,7 +127,7 @@ _ESCAPES = {code: ascii(chr(code))[1:-1] for code in _CONTROLS if chr(code) not 
 
 
 def printable(text: str) -> str:
-    r"""Return the text with every control character but tab and line feed as its escape.
+    r"""Return the text with its control characters escaped, except tab and line feed.
 
     >>> printable("\x1b[2J")
     '\\x1b[2J'
@@ -138,18 +142,18 @@ def one_line(error: BaseException) -> str:
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
-    """Return ", perhaps NAME" for the known name that is most similar, or "" if none is.
+    """Return ", perhaps NAME" with the most similar known name, or "" if no name is similar.
 
     Parameters
     ----------
     name : a name that may be misspelt; its first 80 characters are used.
-    known : the names; the part of each after its last "/" may stand for it.
+    known : the known names. `name` is also compared with the part after the last "/" of each.
 
     >>> names = ["lagrange/taylor", "lagrange/radau"]
     >>> nearest("tailor", names), nearest("euler", names[:1])
     (', perhaps lagrange/taylor', '')
     """
-    import difflib  # of use after a mistake alone; `rotor-mbs list` starts faster without it
+    import difflib  # used only after a mistake; without it `rotor-mbs list` starts faster
 
     by_text = {one: one for one in known}
     # "rk67" may mean "exudyn_tree/rk67"

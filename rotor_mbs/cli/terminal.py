@@ -97,8 +97,8 @@ def print_not_computed(made: Sequence[RunOutcome], refused: Sequence[Refusal] = 
     -------
     bool
         Whether the exit status must not be 0. This holds if a run should be tried again, was
-        refused when its solver was built, or was left out although the user named its method or
-        settings.
+        refused when its solver was built, or was left out before although the user asked for it
+        (`Refusal.is_asked`).
     """
     not_stored = [outcome for outcome in made if not outcome.is_stored]
     lost = [outcome for outcome in not_stored if outcome.status != REFUSED]

@@ -1,8 +1,8 @@
-"""Find methods by name: built-in ones, those of installed packages, those of named files.
+"""Find methods by name: built-in methods, and methods of other packages and of Python files.
 
-Packages add methods by entry points. A model's code is imported when one of its methods is first
-used; its engine, when a solver is built. Which methods run a scene, with which settings, is decided
-in `selection`.
+Other packages add methods by entry points. The user names Python files that define methods. A
+model's code is imported when one of its methods is first used, and its engine when a solver is
+built. `methods.selection` decides which methods run a scene, and with which settings.
 """
 
 from __future__ import annotations
@@ -24,13 +24,14 @@ from rotor_mbs.methods.method_file import ENDING, MethodFile, located, quiet, re
 from rotor_mbs.scenario.toml_file import file_path
 
 REFERENCE = "reference"
-PRINTED = "printed/ode45"  # with all errata
+PRINTED = "printed/ode45"  # the method that has all errata
 GROUP = "rotor_mbs.methods"
 
 R = TypeVar("R")
 
-# The locations of the tuples of built-in methods ("package.module:name"); for each of them, how the
-# names of its methods begin.
+# The location of each tuple of built-in methods, "package.module:name", and the beginnings of the
+# names of these methods. A method is found by the beginning of its name, without importing the
+# modules of other models.
 _BUILT_IN: Mapping[str, tuple[str, ...]] = {
     "rotor_mbs.models.printed.methods:METHODS": ("printed",),
     "rotor_mbs.models.lagrange.methods:METHODS": ("lagrange", REFERENCE),
@@ -43,7 +44,10 @@ _BUILT_IN: Mapping[str, tuple[str, ...]] = {
 
 
 def methods() -> tuple[Method, ...]:
-    """Return every method but the reference, in the order of tables and legends; plug-ins last."""
+    """Return every method but the reference, in the order of tables and legends.
+
+    Built-in methods are first, then those of other packages, then those of Python files.
+    """
     built_in = []
     for location in _BUILT_IN:
         built_in += [method for method in _load(location) if method.name != REFERENCE]
@@ -51,18 +55,18 @@ def methods() -> tuple[Method, ...]:
 
 
 def method_names(*, is_corrected: bool | None = None) -> tuple[str, ...]:
-    """Return the names of all methods.
+    """Return the names of methods: all, or those selected by `is_corrected`.
 
     Parameters
     ----------
-    is_corrected : True for those that claim the corrected equations, False for the others, None for
-        all.
+    is_corrected : True for methods that are declared to solve the corrected equations, False for
+        the other methods, None for all methods.
     """
     return tuple(method.name for method in methods() if is_corrected in (None, method.is_corrected))
 
 
 def _built_in(name: str) -> Method | None:
-    """Return the built-in method of a name, or None; only its own model is imported."""
+    """Return the built-in method with a name, or None; only the method's model is imported."""
     for location, beginnings in _BUILT_IN.items():
         if name.startswith(beginnings):
             for method in _load(location):
@@ -72,20 +76,20 @@ def _built_in(name: str) -> Method | None:
 
 
 def is_built_in(name: str) -> bool:
-    """Return whether a method, "reference" included, is one of this package."""
+    """Return whether the method with a name, which may be "reference", is built in."""
     return _built_in(name) is not None
 
 
 def find_method_or_none(name: str) -> Method | None:
-    """Return the method of a name, "reference" included.
+    """Return the method with a name, which may be "reference", or None if it is unknown.
 
-    None where it is not known here: a results file may come from elsewhere.
+    A results file of another computer may contain methods that are unknown here.
     """
     return _built_in(name) or _file_methods.get(name) or _plug_ins().get(name)
 
 
 def find_method(name: str) -> Method:
-    """Return the method of a name, "reference" included. Raises InputError for an unknown name."""
+    """Return the method with a name, which may be "reference". Raises InputError if unknown."""
     method = find_method_or_none(name)
     if method is None:
         raise InputError(unknown_names([name]))
@@ -93,16 +97,17 @@ def find_method(name: str) -> Method:
 
 
 def check_names(names: str | Sequence[str]) -> tuple[str, ...]:
-    """Return the names of the methods that a user named.
+    """Check the methods that a user named, and return their names.
 
     Parameters
     ----------
-    names : names of methods and paths of Python files, one or several.
+    names : one or several names of methods or paths of Python files.
 
     Returns
     -------
     tuple of str
-        Each name once, in order. A file is replaced by the names of all its methods.
+        Each name once, in the given order. The path of a file is replaced by the names of all its
+        methods.
 
     Raises
     ------
@@ -116,8 +121,8 @@ def check_names(names: str | Sequence[str]) -> tuple[str, ...]:
 
 
 def unknown_names(names: Sequence[str]) -> list[str]:
-    """Return a line for each of the names that no method has."""
-    # Without names no model need be imported.
+    """Return an error line for each of the names that is not the name of a method."""
+    # If there are no names, no model is imported.
     known = method_names() if names else ()
     lines = []
     for name in names:
@@ -128,54 +133,58 @@ def unknown_names(names: Sequence[str]) -> list[str]:
 
 
 def is_corrected(name: str) -> bool:
-    """Return whether a method claims the corrected equations; True for an unknown method."""
+    """Return whether a method is declared to solve the corrected equations.
+
+    Returns True for an unknown method.
+    """
     method = find_method_or_none(name)
     return method is None or method.is_corrected
 
 
 def default_methods() -> tuple[str, ...]:
-    """Return the names of the methods that run where none is named.
+    """Return the names of the default methods.
 
-    A method that is not installed is replaced by its fallback.
+    A default method that is not installed is replaced by its fallback.
     """
     return tuple(_installed_name(method) for method in methods() if method.is_default)
 
 
 def default_method() -> str:
-    """Return the name of the method of `rm.run` and of sweeps where none is named.
+    """Return the name of the method that `rm.run` and sweeps use if the user names no method.
 
-    It is lagrange/taylor, or its fallback where that is not installed.
+    It is lagrange/taylor, or its fallback if lagrange/taylor is not installed.
     """
     return _installed_name(find_method("lagrange/taylor"))
 
 
 def _installed_name(method: Method) -> str:
-    """Return the name of a method, or of its fallback where it is not installed."""
+    """Return the name of a method, or of its fallback if the method is not installed."""
     is_replaced = method.fallback and not method.is_installed
     return method.fallback if is_replaced else method.name
 
 
 def errata_methods() -> dict[str, str]:
-    """Return, for each erratum ("E1", ...), the name of the method that has this erratum alone."""
+    """Return the names of the methods that have a single erratum, by erratum ("E1", ...)."""
     return {method.erratum: method.name for method in methods() if method.erratum}
 
 
 def ladders(names: Sequence[str] = ()) -> dict[str, tuple[Method, Ladder]]:
-    """Return the ladders of methods.
+    """Return the ladders of methods: the steps or tolerances at which `bench` runs them.
 
     Parameters
     ----------
-    names : methods; () for all that have a ladder.
+    names : names of methods; () for all methods that have a ladder.
 
     Returns
     -------
     dict
-        Method and ladder by the name of the curve: "model/integrator", then the variant.
+        Method and ladder by name of the curve, which is the method's name followed by the ladder's
+        variant.
 
     Raises
     ------
     InputError
-        For a method that has none.
+        For a method that has no ladder.
     """
     with_ladder = [method for method in methods() if method.ladders]
     allowed = [method.name for method in with_ladder]
@@ -198,9 +207,9 @@ def ladders(names: Sequence[str] = ()) -> dict[str, tuple[Method, Ladder]]:
 
 
 def label_of(curve: str) -> str:
-    """Return the label of a curve: of a method, or of a variant of one, see `ladders`.
+    """Return the label of a curve, which is a method or a variant of a method (see `ladders`).
 
-    An unknown name is its own label.
+    For an unknown curve, its name is returned.
     """
     method = find_method_or_none(curve)
     if method is not None:
@@ -212,12 +221,12 @@ def label_of(curve: str) -> str:
     return ", ".join(label for label in (method.label, ladder.label) if label)
 
 
-# Methods of files. They are kept in variables of this process, and are replaced there if a file has
-# been edited between two calls.
+# Methods of Python files. Two variables of this process keep them. If a file was edited between two
+# calls, the second call replaces its methods.
 
-# Files that were named, by model.
+# Files that the user named, by model.
 _files: dict[str, MethodFile] = {}
-# Their methods by name.
+# Methods of these files by name.
 _file_methods: dict[str, Method] = {}
 
 
@@ -226,7 +235,7 @@ def _expand_files(names: Sequence[str]) -> list[str]:
 
     Parameters
     ----------
-    names : of methods, and paths of Python files.
+    names : names of methods, and paths of Python files.
 
     Raises
     ------
@@ -234,7 +243,7 @@ def _expand_files(names: Sequence[str]) -> list[str]:
         If a file cannot be loaded, or two files have the same name.
     """
     expanded: list[str] = []
-    paths: dict[str, str] = {}  # by model
+    paths: dict[str, str] = {}  # paths of the files by model
     for name in names:
         if not name.endswith(ENDING):
             expanded.append(name)
@@ -250,7 +259,10 @@ def _expand_files(names: Sequence[str]) -> list[str]:
 
 
 def _register(file: MethodFile) -> list[str]:
-    """Register the methods of a file in place of those that it had before; return their names."""
+    """Register the methods of a file, and return their names.
+
+    They replace the methods that were registered for the file before.
+    """
     if _files.get(file.model) != file:
         others = {}
         for name, method in _file_methods.items():
@@ -266,11 +278,11 @@ def _register(file: MethodFile) -> list[str]:
 def with_method_files(work: Callable[..., R]) -> Callable[..., R]:
     """Return a function that loads the method files of this process, and then calls `work`.
 
-    It is for a worker process. What is printed there, also by `work`, is dropped.
+    The function is for worker processes. There, the output of the files and of `work` is dropped.
 
     Parameters
     ----------
-    work : the function; it is returned itself if no files are named.
+    work : the function to call. It is returned unchanged if the user named no files.
     """
     if not _files:
         return work
@@ -280,9 +292,9 @@ def with_method_files(work: Callable[..., R]) -> Callable[..., R]:
 def _call_with_files(
     process_id: int, files: Sequence[MethodFile], work: Callable[..., R], *arguments: object
 ) -> R:
-    """Call a function after the methods of files have been loaded.
+    """Load the methods of files, then call the function `work`.
 
-    The process `process_id` created the call; in any other process the output is dropped.
+    The output of `work` is dropped unless this process is `process_id`, which created the call.
     """
     for file in files:
         _register(file)
@@ -291,7 +303,7 @@ def _call_with_files(
 
 
 def error_line(error: BaseException) -> str:
-    """Return what a method raised in one line, with the place in a method file if it has one."""
+    """Return an error of a method in one line, with the line of a method file that raised it."""
     return located(error, [file.path for file in _files.values()])
 
 
@@ -305,7 +317,10 @@ def _load(location: str) -> tuple[Method, ...]:
 
 
 def _as_methods(loaded: object) -> tuple[Method, ...]:
-    """Return the methods in an entry point's object. Raises TypeError if it is something else."""
+    """Return the methods in the object of an entry point: a Method, or a sequence of Methods.
+
+    Raises TypeError for any other object.
+    """
     several = tuple(loaded) if isinstance(loaded, Iterable) else (loaded,)
     if not several or not all(isinstance(method, Method) for method in several):
         raise TypeError(f"{loaded!r:.60} is no Method and no sequence of them")
@@ -314,7 +329,7 @@ def _as_methods(loaded: object) -> tuple[Method, ...]:
 
 def _warn(message: str, *values: object) -> None:
     """Write a warning to this package's log."""
-    import logging  # late: 6 ms that `rotor-mbs list` need not wait for
+    import logging  # imported late: it takes 6 ms, and `rotor-mbs list` does not need it
 
     logging.getLogger("rotor_mbs").warning(message, *values)
 
@@ -323,14 +338,14 @@ def _warn(message: str, *values: object) -> None:
 def _plug_ins() -> dict[str, Method]:
     """Return the methods of other packages by name.
 
-    One that cannot be loaded is left out, with a warning.
+    Methods that cannot be loaded, or whose name is already used, are left out with a warning.
     """
     taken = {REFERENCE} | {method.name for location in _BUILT_IN for method in _load(location)}
     plug_ins: dict[str, Method] = {}
     for point in metadata.entry_points(group=GROUP):
         try:
             loaded = _as_methods(point.load())
-        except (Exception, SystemExit) as exc:  # whatever another package raises must not stop this
+        except (Exception, SystemExit) as exc:  # another package may raise any error
             message = "plug-in %s of %s omitted: %s: %s"
             _warn(message, point.name, point.value, type(exc).__name__, exc)
             continue
@@ -341,7 +356,7 @@ def _plug_ins() -> dict[str, Method]:
                 _warn(message, point.name, point.value, method.name)
                 continue
             taken.add(method.name)
-            # The version of its own package is stored with its runs, too.
+            # With this, the version of the plug-in's package is stored with the method's runs.
             distributions = tuple(dict.fromkeys((*method.distributions, *package)))
             sources = _sources(point.module)
             plug_ins[method.name] = replace(method, distributions=distributions, sources=sources)
@@ -349,7 +364,10 @@ def _plug_ins() -> dict[str, Method]:
 
 
 def _sources(module: str) -> tuple[Path, ...]:
-    """Return the files of the package that a module is in, or the module's own."""
+    """Return the Python files of the top-level package that contains a module.
+
+    For a top-level module that is not a package, this is the file of the module.
+    """
     top = import_module(module.partition(".")[0])
     folders = [Path(folder) for folder in getattr(top, "__path__", ())]
     if folders:

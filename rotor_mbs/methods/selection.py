@@ -1,7 +1,8 @@
-"""Decide which methods run a scene, with which settings.
+"""Decide which methods run a scene, and with which settings.
 
-Methods that are named run if they can represent the scene. If none is named, a rule selects them.
-It was found with the stability suite, which shows the scenes on which methods fail or take minutes.
+Methods that are named run if they can represent the scene. If no method is named, a rule selects
+methods. The rule was derived from results of the stability suite, which shows the scenes on which
+methods fail or take minutes.
 """
 
 from __future__ import annotations
@@ -33,13 +34,13 @@ def settings_for(names: Sequence[str], given: Mapping[str, object]) -> dict[str,
 
     Parameters
     ----------
-    names : known methods.
-    given : settings by name.
+    names : names of known methods.
+    given : values of settings by name of the setting.
 
     Returns
     -------
     dict
-        By method, those of the settings that it has.
+        For each method, the given values of the settings that it has.
 
     Raises
     ------
@@ -47,7 +48,7 @@ def settings_for(names: Sequence[str], given: Mapping[str, object]) -> dict[str,
         For a setting that none of the methods has, and for a value that is not allowed.
     """
     if len(names) == 1:
-        # The message for a single method also lists what each setting may be.
+        # For a single method, the message of this check lists the allowed values of each setting.
         find_method(names[0]).settings.of(names[0], given)
     declared = {name: find_method(name).settings.declared() for name in names}
     known = list(dict.fromkeys(setting for settings in declared.values() for setting in settings))
@@ -66,7 +67,7 @@ def settings_for(names: Sequence[str], given: Mapping[str, object]) -> dict[str,
 
 
 def own_settings(scene: Scene, method: str) -> dict[str, object]:
-    """Return those of a scene's own settings that a method has.
+    """Return the scene's own settings, without those that a method does not have.
 
     Parameters
     ----------
@@ -76,11 +77,11 @@ def own_settings(scene: Scene, method: str) -> dict[str, object]:
     Raises
     ------
     InputError
-        If the scene has a setting that no method at all has.
+        If the scene has a setting that no method has, or a value that is not allowed.
     """
     if not scene.settings:
         return {}
-    # Checked against all methods: a setting may be that of a method that is not run.
+    # The settings are checked against all methods, as some may be for a method that is not run.
     try:
         return settings_for(method_names(), dict(scene.settings)).get(method, {})
     except InputError as error:
@@ -89,12 +90,14 @@ def own_settings(scene: Scene, method: str) -> dict[str, object]:
 
 
 def settings_of_run(scene: Scene, method: str, given: Mapping[str, object]) -> dict[str, object]:
-    """Return the settings of a run: the scene's own, overridden by those that are given.
+    """Return the settings of a run: the scene's own settings, overridden by the given ones.
 
     Parameters
     ----------
-    scene, method : what is run.
-    given : settings by name, checked by `settings_for`; those of other methods are ignored.
+    scene : the scene of the run.
+    method : name of the method of the run.
+    given : values by name of the setting, checked by `settings_for`. Settings that the method does
+        not have are ignored.
     """
     declared = find_method(method).settings.declared()
     of_method = {name: value for name, value in given.items() if name in declared}
@@ -102,15 +105,15 @@ def settings_of_run(scene: Scene, method: str, given: Mapping[str, object]) -> d
 
 
 def problems_of_methods(values: Mapping[str, Any]) -> list[KeyProblem]:
-    """Return what is wrong with the `methods` that a scene file or a sweep file names."""
+    """Return the problems of the key `methods` in a scene file or a sweep file."""
     return [KeyProblem(("methods",), line) for line in unknown_names(values.get("methods", ()))]
 
 
 def problems_of_scene(values: Mapping[str, Any]) -> list[KeyProblem]:
-    """Return what is wrong with the `methods` and `settings` of a scene file.
+    """Return the problems of the keys `methods` and `settings` in a scene file.
 
-    A setting must be one that some method has. Those of a sweep file are checked elsewhere: they
-    must be settings of the methods that the sweep is run with.
+    In a scene file, any method may have the setting. The settings in a sweep file are checked
+    elsewhere, because there a method of the sweep must have the setting.
     """
     problems = problems_of_methods(values)
     settings = dict(values.get("settings", ()))
@@ -131,10 +134,11 @@ class Refusal:
 
     Attributes
     ----------
-    scene, method : their names; "" for `method` if no method was selected for the scene.
-    reason : in one sentence.
-    is_asked : whether the method or its settings were named, by the call or by the scene, not
-        selected by a rule.
+    scene : name of the scene.
+    method : name of the method; "" if no method was selected for the scene.
+    reason : why the run is left out, in one sentence.
+    is_asked : whether the user asked for the run. False if a rule selected the method, unless the
+        run is refused for its settings, and the call or the scene's file sets some of them.
     """
 
     scene: str
@@ -156,27 +160,27 @@ def supporting_methods(
 ) -> tuple[list[str], list[Refusal]]:
     """Return which methods can run a scene, and a Refusal for each that cannot.
 
-    This is where every command decides what it leaves out.
+    All commands use this function to decide which runs they leave out.
 
     Parameters
     ----------
     scene : the scene.
-    names : known methods.
-    settings : those of the call, checked by `settings_for`. A method that has such a setting uses
-        it in place of the scene's own and of its default. With None, settings are not checked: the
-        caller will choose ones that fit the scene.
-    are_named : whether the user named the methods.
+    names : names of known methods.
+    settings : settings of the call, checked by `settings_for`. They override the scene's own
+        settings and the defaults of the methods that have them. None if the caller later chooses
+        settings that fit the scene; settings are then not checked.
+    are_named : whether the call or the scene's file names the methods.
 
     Raises
     ------
     InputError
-        If the scene has a setting that no method has.
+        If the scene has a setting that no method has, or a value that is not allowed.
     """
     supporting: list[str] = []
     refused: list[Refusal] = []
     for name in names:
         method = find_method(name)
-        # `items` of a method file raises InputError for any error in the file's code.
+        # For a method of a Python file, `items` raises InputError for any error in the file's code.
         try:
             method.items(scene)
         except (MethodRefusal, InputError) as exc:
@@ -184,8 +188,8 @@ def supporting_methods(
             continue
         if settings is not None:
             of_run = settings_of_run(scene, name, settings)
-            # Names and ranges are checked already: what is refused here are values that do not fit
-            # this scene, such as a step too short for its duration.
+            # Names and ranges of the settings are checked already. `chosen` refuses values that do
+            # not fit this scene, such as a step that is too short for the scene's duration.
             try:
                 method.chosen(scene, of_run)
             except InputError as exc:
@@ -197,7 +201,7 @@ def supporting_methods(
 
 
 def _reason(error: Exception, method: str) -> str:
-    """Return the text of an error without the method's name in front."""
+    """Return the text of an error without the name that stands in front of it."""
     return str(error).removeprefix(f"{method}: ")
 
 
@@ -206,25 +210,27 @@ def selected_methods(
     names: Sequence[str] = (),
     settings: Mapping[str, object] | None = None,
 ) -> tuple[dict[str, list[str]], list[str], list[Refusal]]:
-    """Select the methods of each scene: those named, else those of its file, else by the rule.
+    """Select the methods of each scene: those in `names`, else those in its file, else by the rule.
 
     Parameters
     ----------
     scenes : the scenes.
-    names : known methods; () for none.
-    settings : of the call, for the methods that have them.
+    names : names of known methods; () if the call names no method.
+    settings : settings of the call. Each method gets the settings that it has.
 
     Returns
     -------
-    methods : by scene name; an empty list where none can run.
+    methods : names of the selected methods by scene name. The list is empty if no method can run
+        the scene.
     reasons : a line for each scene for which the rule selected methods.
-    refused : the methods that were left out, and the scenes for which the rule selects none.
+    refused : a Refusal for each method that is left out, and for each scene for which the rule
+        selects no method.
 
     Raises
     ------
     InputError
-        For an unknown method of a scene, and for a setting that none of the methods has or whose
-        value is invalid.
+        If a scene's file names an unknown method, or if a setting has an invalid value or belongs
+        to none of the methods.
     """
     wanted: dict[str, list[str]] = {}
     rules: dict[str, str] = {}
@@ -232,7 +238,7 @@ def selected_methods(
     for scene in scenes:
         if not names and (unknown := unknown_names(scene.methods)):
             raise InputError(f"{scene.name}: methods: {line}" for line in unknown)
-        wanted[scene.name] = list(names or dict.fromkeys(scene.methods))  # each once
+        wanted[scene.name] = list(names or dict.fromkeys(scene.methods))  # each name once
         if not wanted[scene.name]:
             try:
                 recommended, reason = recommend(scene, default_methods())
@@ -242,7 +248,7 @@ def selected_methods(
                 wanted[scene.name] = list(recommended)
                 rules[scene.name] = reason
     all_names = list(dict.fromkeys(name for methods in wanted.values() for name in methods))
-    settings_for(all_names, settings or {})  # refuses what no method has
+    settings_for(all_names, settings or {})  # checks the settings
     selected: dict[str, list[str]] = {}
     for scene in scenes:
         are_named = bool(names or scene.methods)
@@ -257,40 +263,43 @@ def selected_methods(
 
 # The rule
 
-# rad/s: up to this angular frequency explicit fixed steps of default size (1e-3 s and below) stay
-# within their bounds.
+# Largest angular frequency (rad/s) at which methods with explicit steps of the default fixed size
+# (at most 1e-3 s) stay within their bounds.
 _MAX_EXPLICIT_SWING = 90.0
-# Decay rate times duration, beyond which stability alone, not accuracy, limits an explicit step.
+# Product of decay rate and duration above which stability, not accuracy, limits the step of an
+# explicit method.
 _MAX_EXPLICIT_DECAY = 1e4
-# rad: phase of the fastest oscillation over a run, beyond which fixed steps take minutes and their
-# errors have added up.
+# Largest phase (rad) of the fastest oscillation over a run for methods with fixed steps. Above it,
+# these methods take minutes, and their errors accumulate.
 _MAX_FIXED_STEP_TURN = 3e4
-# Ratio of the hub's inertia to the largest that the rotor has at any pitch. A blade that is a point
-# mass does not resist the rotation of the shaft at a pitch of ±π/2, as its pitch gives way. With
-# one such blade only the hub's inertia is left, and below this ratio rates jump there.
+# Ratio of the hub's inertia to the largest inertia of the rotor at any pitch, below which a rotor
+# with one point-mass blade is nearly singular. At a pitch of ±π/2 such a blade does not resist the
+# rotation of the shaft, as it yields in pitch. Only the hub's inertia is left there, and if it is
+# below this ratio, the rates change abruptly.
 _NEARLY_SINGULAR = 1e-3
-# The same ratio, below which SciPy's shortest step is too long to pass ±π/2: at 3e-13 a run breaks
-# off there, at 3e-10 it passes.
+# Ratio of the same inertias below which SciPy's shortest step is too long to pass a pitch of ±π/2.
+# At a ratio of 3e-13 a run stops there with an error; at 3e-10 it passes.
 _NO_STEP_PASSES = 1e-11
 
 
 def recommend(scene: Scene, defaults: tuple[str, ...]) -> tuple[tuple[str, ...], str]:
-    """Return the methods to take for a scene, and the reason.
+    """Return the methods that the rule selects for a scene, and the reason.
 
     Parameters
     ----------
     scene : the scene.
-    defaults : names of the methods that run unless the scene is singular, stiff or long.
+    defaults : names of the default methods. All of them are selected for a scene that is not nearly
+        singular, stiff, fast or long.
 
     Returns
     -------
-    names : the recommended method first.
-    reason : in one line.
+    names : names of the selected methods, the recommended one first.
+    reason : why the rule selects these methods, in one line.
 
     Raises
     ------
     MethodRefusal
-        With the reason, if there is no motion to follow.
+        If the mass matrix is or must become singular. The message has the reason.
     """
     reason = singular_reason(scene)
     if reason:
@@ -302,7 +311,7 @@ def recommend(scene: Scene, defaults: tuple[str, ...]) -> tuple[tuple[str, ...],
     if decay * scene.duration > _MAX_EXPLICIT_DECAY and decay > 10.0 * swing:
         reason = f"overdamped (largest decay rate {decay:.2g} 1/s): an implicit method in addition"
         return (closed_form, "lagrange/radau"), reason
-    # One point-mass blade whose pitch may come to ±π/2, where it does not resist the shaft.
+    # A single point-mass blade does not resist the rotation of the shaft at a pitch of ±π/2.
     has_one_point = len(scene.blades) == 1 and scene.blades[0].is_point_mass
     if has_one_point and _leaves_zero_pitch(scene):
         rotor_inertia = _largest_rotor_inertia(scene)
@@ -325,7 +334,7 @@ def recommend(scene: Scene, defaults: tuple[str, ...]) -> tuple[tuple[str, ...],
 
 
 def fastest_rates(scene: Scene) -> tuple[float, float]:
-    """Estimate the fastest oscillation and the fastest decay in a motion.
+    """Estimate the rates of the fastest oscillation and of the fastest decay in a scene's motion.
 
     Parameters
     ----------
@@ -333,14 +342,14 @@ def fastest_rates(scene: Scene) -> tuple[float, float]:
 
     Returns
     -------
-    swing : rad/s, largest of the initial rates and of the angular frequencies of the pitches under
-        spring, torque, gravity and the acceleration of a driven rotor.
-    decay : 1/s, largest decay rate by the dampers of shaft and bearings.
+    swing : largest of the initial rates and the angular frequencies of the pitches, rad/s. Spring,
+        torque, gravity and the acceleration of a driven rotor determine these frequencies.
+    decay : largest decay rate that the dampers of shaft and bearings cause, 1/s.
     """
     swing = abs(scene.initial_rates[0])
     rotor_inertia = _largest_rotor_inertia(scene)
     largest_torque = max((abs(torque) for _, torque in scene.rotor_torque), default=0.0)
-    driven = largest_torque / rotor_inertia  # rad/s², of the rotor
+    driven = largest_torque / rotor_inertia  # angular acceleration of the rotor, rad/s²
     decay = scene.shaft_damping / rotor_inertia if scene.shaft_damping else 0.0
     blades = zip(
         scene.blades,
@@ -355,7 +364,8 @@ def fastest_rates(scene: Scene) -> tuple[float, float]:
         x, y, z = blade.centre_of_mass
         inertia = blade.pitch_inertia
         torque = max((abs(value) for _, value in torques), default=0.0)
-        # N m about the pitch axis; that of the spring at a deflection of 1 rad.
+        # `moment` is the moment about the pitch axis in N m. Its part from the spring is that at a
+        # deflection of 1 rad.
         acceleration = scene.gravity + driven * abs(z)
         moment = stiffness + torque + blade.mass * acceleration * math.hypot(x, y)
         swing = max(swing, math.sqrt(moment / inertia), abs(rate))
@@ -364,13 +374,13 @@ def fastest_rates(scene: Scene) -> tuple[float, float]:
 
 
 def singular_reason(scene: Scene) -> str:
-    """Return why the mass matrix of a scene is singular or must become so; "" if neither holds.
+    """Return why the mass matrix of a scene is or must become singular; "" if it does not.
 
-    Only point-mass blades on a hub without inertia can make it so.
+    Only a rotor with point-mass blades and a hub without inertia can have a singular mass matrix.
 
     Parameters
     ----------
-    scene : the scene; its mass matrix depends on the pitches.
+    scene : the scene.
     """
     if not _largest_rotor_inertia(scene):
         return "no inertia about the shaft; allowed: a hub or blade with inertia"
@@ -391,8 +401,8 @@ def singular_reason(scene: Scene) -> str:
 def _largest_rotor_inertia(scene: Scene) -> float:
     """Return an upper bound on the rotor's inertia about the shaft (kg m²), for all pitches.
 
-    A moment of inertia is at most half the trace of its tensor. A point mass reaches the bound when
-    it is furthest from the shaft.
+    A moment of inertia about any axis is at most half the trace of the inertia tensor. A point-mass
+    blade reaches this bound when it is in the plane through the apex normal to the shaft.
     """
     total = scene.hub_inertia
     for blade in scene.blades:
@@ -401,11 +411,12 @@ def _largest_rotor_inertia(scene: Scene) -> float:
 
 
 def _leaves_zero_pitch(scene: Scene) -> bool:
-    """Return whether the first blade's pitch leaves zero, with no spring to keep it below ±π/2."""
+    """Return whether the first blade's pitch may leave zero, and no spring keeps it below ±π/2."""
     _, y, _ = scene.blades[0].centre_of_mass
     starts_at_zero = scene.initial_angles[1] == 0.0 and scene.initial_rates[1] == 0.0
     leans = scene.blades[0].cone != 0.0 or (scene.shaft_tilt != 0.0 and scene.gravity != 0.0)
-    # Gravity and the rotor's motion turn no pitch if the blade is in the plane of rotation.
+    # Gravity and the rotor's motion do not change a blade's pitch if the centre of mass is in the
+    # plane of rotation.
     is_in_plane = y == 0.0 and not leans
     stays = is_in_plane and starts_at_zero and not scene.pitch_torque
     return not stays and not any(scene.bearing_stiffness)

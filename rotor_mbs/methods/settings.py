@@ -1,6 +1,6 @@
-"""Declare the settings of a method once, with unit, default and allowed values, and check them.
+"""Declare the settings of a method with unit, default and allowed values, and check their values.
 
-What a value may be is a `Kind` of `scenario.keys`, as for the keys of a scene file.
+The allowed values of a setting are a `Kind` of `scenario.keys`, like those of a key of a scene.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ def number(
     at_most: float = math.inf,
     doc: str = "",
 ) -> Any:
-    """Declare a field of a `Settings` class: a finite number.
+    """Declare a field of a `Settings` class whose value is a finite number.
 
     Parameters
     ----------
-    default : if it is an int, whole numbers alone are allowed.
+    default : default value. If it is an int, only whole numbers are allowed.
     unit : SI unit; "" for none.
     above, at_least, at_most : exclusive lower, inclusive lower and inclusive upper limit.
     doc : description in one line.
@@ -40,18 +40,18 @@ def number(
 
 
 def step(default: float) -> Any:
-    """Declare a field of a `Settings` class: a time step in s."""
+    """Declare a field of a `Settings` class whose value is a time step in s."""
     doc = "time step; shortened to fit the sample interval"
     return number(default, unit="s", above=0.0, doc=doc)
 
 
 def choice(default: object, options: Sequence[object], *, doc: str = "") -> Any:
-    """Declare a field of a `Settings` class: one of several values.
+    """Declare a field of a `Settings` class whose value is one of the given options.
 
     Parameters
     ----------
-    default : one of the allowed values.
-    options : all of them: texts, numbers or flags.
+    default : default value, one of the options.
+    options : all allowed values, which may be texts, numbers or flags.
     doc : description in one line.
     """
     kind = keys.choice(options, " or ".join(map(str, options)))
@@ -59,18 +59,21 @@ def choice(default: object, options: Sequence[object], *, doc: str = "") -> Any:
 
 
 def _declaration(kind: Kind, unit: str, doc: str) -> dict[str, Any]:
-    """Return the metadata of a field, as `Settings.declared` gives them."""
-    # Messages have what is allowed in parentheses, therefore the unit is added without brackets.
+    """Return the metadata of a field of a `Settings` class."""
+    # Messages write the allowed values in parentheses. The unit is therefore not in parentheses.
     note = f", in {unit}" if unit else ""
     return keys.declaration(kind, unit, note, doc=doc)
 
 
-# For a field that a class declares without `number`, `step` or `choice`.
+# Metadata of a field that a class declares without `number`, `step` or `choice`.
 _UNDECLARED = _declaration(keys.PYTHON_NUMBER, "", "")
 
 
 def unknown_setting(name: str, known: Iterable[str]) -> str:
-    """Return the line for an unknown setting, with a hint if it looks like a key of a scene."""
+    """Return the message for an unknown setting.
+
+    It has a hint if the name is similar to a known setting, or may be a key of a scene.
+    """
     line = f"no setting {name!r}{nearest(name, known)}"
     if "." in name:
         line += " (a key of scenes? rotor-mbs new FILE --from SCENE copies one, to be edited)"
@@ -98,12 +101,13 @@ class Settings:
         Parameters
         ----------
         method : name of the method, for messages.
-        given : values by the names of settings; the others have their defaults.
+        given : values by name of the setting. Settings that are not given have their defaults.
 
         Raises
         ------
         InputError
-            For unknown names and values that are not allowed, in one line with all settings.
+            For unknown names and values that are not allowed. The message is one line with all
+            problems, followed by the description of all settings.
         """
         declared = cls.declared()
         values: dict[str, Any] = {}
@@ -122,12 +126,13 @@ class Settings:
 
     @classmethod
     def declared(cls) -> dict[str, Mapping[str, Any]]:
-        """Return what is declared of each setting, by name.
+        """Return the declarations of the settings by name.
 
         Returns
         -------
         dict
-            Mappings with `kind`, a `Kind`; `unit`; `allowed`, what is allowed in words; `doc`.
+            For each setting a mapping with `kind` (a `Kind`), `unit`, `allowed` (the allowed values
+            in words) and `doc` (description).
         """
         declared: dict[str, Mapping[str, Any]] = {}
         for setting in fields(cls):
@@ -137,7 +142,7 @@ class Settings:
 
     @classmethod
     def describe(cls) -> str:
-        """Return all settings with what is allowed and their defaults, in one line."""
+        """Return a line with all settings, their allowed values and their defaults."""
         defaults = cls().as_dict()
         texts = []
         for name, setting in cls.declared().items():
@@ -145,5 +150,5 @@ class Settings:
         return ", ".join(texts) or "none"
 
     def as_dict(self) -> dict[str, object]:
-        """Return the values by the names of the settings."""
+        """Return the values of the settings by name."""
         return asdict(self)

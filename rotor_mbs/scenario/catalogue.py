@@ -109,7 +109,7 @@ def find_scenes(arguments: Sequence[str], check: ValuesCheck | None = None) -> l
     for path in paths:
         try:
             real = path.resolve()
-        except (OSError, RuntimeError, ValueError):  # links that form a circle, or a NUL in the name
+        except (OSError, RuntimeError, ValueError):  # a circle of links, or a NUL in the name
             what = "cannot be resolved to a file; allowed: a readable TOML file"
             problems.append(f"{shown_path(path)}: {what}")
             continue

@@ -1,4 +1,7 @@
-"""Evaluate arithmetic in quotes, "11*pi/12", in an input file: parsed, never run as code."""
+"""Evaluate arithmetic in quotes in an input file, such as "11*pi/12".
+
+The text is parsed, and never run as code.
+"""
 
 from __future__ import annotations
 
@@ -13,15 +16,16 @@ from rotor_mbs.scenario.toml_file import as_text
 ALLOWED = "numbers, + - * / ** ( ), pi, sqrt(x), hypot(x, y), deg(x)"
 MAX_LENGTH = 200  # characters
 
-# What Python would read but an expression may not hold: other characters, 0x10, 1j, 2pi, a comma
-# that ends a list.
+# What an expression may not contain, although Python would read most of it. In this order: other
+# characters; a letter after a digit or point (0x10, 1j, 2pi), except in an exponent; a comma before
+# a closing parenthesis; //.
 _FORBIDDEN = re.compile(
     r"[^0-9A-Za-z.+\-*/(), \t]"
     r"|(?<=[0-9.])(?![eE][+-]?[0-9])[A-Za-z]"
     r"|,(?=[ \t]*\))"
     r"|//"
 )
-# Python refuses 007, which other programs write.
+# Other programs write 007, which Python refuses.
 _LEADING_ZEROS = re.compile(r"(?<![0-9A-Za-z.])0+(?=[0-9])")
 _OPERATIONS: dict[type[ast.operator], tuple[str, Callable[[float, float], float]]] = {
     ast.Add: ("+", operator.add),
@@ -30,7 +34,7 @@ _OPERATIONS: dict[type[ast.operator], tuple[str, Callable[[float, float], float]
     ast.Div: ("/", operator.truediv),
     ast.Pow: ("**", math.pow),
 }
-# By name: the function, and how many arguments it takes.
+# For each name, the function and its number of arguments.
 _FUNCTIONS: dict[str, tuple[Callable[..., float], int]] = {
     "sqrt": (math.sqrt, 1),
     "hypot": (math.hypot, 2),
@@ -39,16 +43,16 @@ _FUNCTIONS: dict[str, tuple[Callable[..., float], int]] = {
 
 
 def evaluate(text: str) -> float:
-    """Return the number that an expression stands for.
+    """Return the value of an arithmetic expression.
 
     Parameters
     ----------
-    text : such as "11*pi/12"; what it may consist of is `ALLOWED`.
+    text : the expression, such as "11*pi/12". `ALLOWED` lists what it may consist of.
 
     Returns
     -------
     float
-        Finite. Every step is rounded as Python's floats are.
+        The finite value. The result of every operation is rounded to double precision.
 
     Raises
     ------
@@ -66,7 +70,7 @@ def evaluate(text: str) -> float:
     if forbidden:
         raise ValueError(f"{forbidden[0]!a} has no meaning in an expression")
     try:
-        # Deep nesting ends the parser by any of the three errors.
+        # If the nesting is too deep, the parser may raise any of the three errors.
         return _value(ast.parse(_LEADING_ZEROS.sub("", text.strip(" \t")), mode="eval").body)
     except (SyntaxError, MemoryError, RecursionError) as error:
         raise ValueError(f"{as_text(text)} is not a complete expression") from error
@@ -82,7 +86,7 @@ def _value(node: ast.expr) -> float:
     Raises
     ------
     ValueError
-        If it is not arithmetic, or has no finite value.
+        If the part is not arithmetic, or has no finite value.
     """
     match node:
         case ast.Constant(value=int() | float() as number) if not isinstance(number, bool):
@@ -105,7 +109,10 @@ def _value(node: ast.expr) -> float:
 
 
 def _applied(operation: str, function: Callable[..., float], *arguments: float) -> float:
-    """Return the value of a function. Raises ValueError with the operation unless it is finite."""
+    """Return the value of a function of the arguments.
+
+    Raises ValueError with the text `operation` if the value is not finite.
+    """
     try:
         value = function(*arguments)
     except (ArithmeticError, ValueError):

@@ -1,9 +1,9 @@
 """Declare what values of keys and settings are allowed, and read them.
 
-A `Kind` converts a value and says in words what is allowed; kinds are made from one another: a
-number, a number within limits, a list of them. A field of a dataclass declares a key of a file by
-`file_key`, a setting of a method by the functions of `methods.settings`; both are read through the
-kind. What is wrong is raised as a TableError, all of a file at once.
+A `Kind` converts a value, and says in words which values are allowed. Kinds are made from simpler
+kinds: a number, a number within limits, a list of such numbers. A field of a dataclass declares a
+key of a file (by `file_key`) or a setting of a method (by the functions of `methods.settings`). The
+kind in the declaration reads the value. All errors of a file are raised together in one TableError.
 """
 
 from __future__ import annotations
@@ -22,25 +22,26 @@ from rotor_mbs.scenario.toml_file import KeyProblem, TableError, as_text
 
 MAX_NUMBER = 1e300
 MAX_TEXT = 200  # characters
-# Of what a rotor is and what acts on it, but for zero: inertias, moments and accelerations,
-# products of up to four such numbers, are then between 1e-100 and 1e100, and the product of any
-# three of these is a normal double.
+# Limits of the size of numbers that describe a rotor or its loads, except zero. Inertias, moments
+# and accelerations are products of up to four such numbers. With these limits, they are between
+# 1e-100 and 1e100, and the product of any three of them is a normal double.
 SMALLEST, LARGEST = 1e-25, 1e25
-# Unicode categories: controls, direction marks, line ends. They would spoil a terminal.
+# Unicode categories of control characters, direction marks, surrogates and line ends. They would
+# corrupt the output on a terminal.
 _UNPRINTABLE = ("Cc", "Cf", "Cs", "Zl", "Zp")
 
 
 @dataclass(frozen=True)
 class Kind:
-    """What a value may be.
+    """What a value of a key or setting may be: how it is read, and what is allowed in words.
 
     Attributes
     ----------
-    read : (value) -> the value as the program keeps it; raises TableError where it is not allowed.
-        With `in_context`: (value, values of the keys before it by field).
-    allowed : what is allowed, for messages; {unit} stands for the unit.
-    in_context : whether what is allowed depends on the keys before it.
-    per_blade : whether a file may have one value for all blades.
+    read : (value) -> the converted value. It raises TableError for a value that is not allowed. If
+        `in_context` is set, its second argument has the values that were read before, by field.
+    allowed : the allowed values in words, for messages; {unit} stands for the unit.
+    in_context : whether the allowed values depend on the values of keys that were read before.
+    per_blade : whether a file may have one value for all blades in place of a list.
     over_time : whether a value may be a table over time.
     options : the allowed values of a choice; () for any other kind.
     """
@@ -76,10 +77,10 @@ def declaration(
     Parameters
     ----------
     kind : what the value may be.
-    unit : its unit.
-    shown_unit : the unit as it follows a number in messages.
-    note : what a user has to know beyond the kind, after it in messages.
-    **more : what else the class wants to know of its fields.
+    unit : unit of the value.
+    shown_unit : text that stands for {unit} in `kind.allowed`.
+    note : text that follows the allowed values in messages.
+    **more : further entries of the metadata.
     """
     return {
         "kind": kind,
@@ -102,12 +103,13 @@ def file_key(
 
     Parameters
     ----------
-    path : the key, with its table: "hub.inertia"; "" for a field that is not in the file.
-    kind : what its value may be.
-    unit : its unit; "1" for none.
-    note : what a user has to know beyond the kind, after it in messages.
-    default : of the field and of the key, which then may be missing in a file.
-    **more : `optional`, the default of a key whose field has none, and what the class adds.
+    path : the key with its table, such as "hub.inertia"; "" for a field that is not in the file.
+    kind : what the value of the key may be.
+    unit : unit of the value; "1" for none.
+    note : text that follows the allowed values in messages.
+    default : default value of the field. If it is given, the key may be missing in a file.
+    **more : further entries of the metadata. With `optional`, the key may be missing although the
+        field has no default; `optional` is then its value.
     """
     shown_unit = "" if unit == "1" else f" ({unit.replace('^2', '²')})"
     metadata = declaration(kind, unit, shown_unit, note, key=path, **more)
@@ -126,12 +128,12 @@ def declared_keys(cls: Any) -> dict[str, Mapping[str, Any]]:
 
 
 def invalid(what: str, allowed: str = "") -> TableError:
-    """Return the error of a value.
+    """Return a TableError with one problem of a value.
 
     Parameters
     ----------
     what : what is wrong.
-    allowed : what is allowed, where that is more than the kind says of all values.
+    allowed : what is allowed; "" if the declaration of the key says it.
     """
     return TableError([KeyProblem((), what, allowed)])
 
@@ -149,12 +151,12 @@ def read_number(value: object) -> float:
 
     Parameters
     ----------
-    value : as a file has it.
+    value : value in a file.
 
     Raises
     ------
     TableError
-        If it is no number, or out of range.
+        If the value is not a number, or is out of range.
     """
     result = value
     if isinstance(value, str):
@@ -164,19 +166,22 @@ def read_number(value: object) -> float:
             allowed = f"in quotes {expressions.ALLOWED}"
             shown = as_text(value)
             reason = str(error)
-            # The reason may begin with the whole text, or a part of it.
+            # The reason may already begin with the text; then the text is not repeated.
             what = reason if reason.startswith(f"{shown} ") else f"{shown}: {reason}"
             raise invalid(what, allowed) from error
     if isinstance(result, bool) or not isinstance(result, Real):
         raise invalid(f"{as_text(value)} is not a number")
     number = as_float(result)
-    if not abs(number) <= MAX_NUMBER:  # so written that NaN fails, too
+    if not abs(number) <= MAX_NUMBER:  # this form also refuses NaN
         raise invalid(f"{as_text(value)} is out of range", f"finite numbers, |x| <= {MAX_NUMBER:g}")
     return number
 
 
 def read_python_number(value: object) -> float:
-    """Return a finite float, from a number alone: Python code writes its own arithmetic."""
+    """Return a finite float from a number.
+
+    Arithmetic in quotes is refused, as Python code can compute the number itself.
+    """
     if isinstance(value, str):
         raise invalid(f"{as_text(value)} is not a number")
     return read_number(value)
@@ -189,7 +194,7 @@ def _read_whole(value: object) -> int:
 
 
 def _read_python_whole(value: object) -> int:
-    """Return an int, also from a whole float: settings of a scene file are read as floats."""
+    """Return an int from an int or a whole float: a scene file's settings are read as floats."""
     number = read_python_number(value)
     if number != int(number):
         raise invalid(f"{as_text(value)} is not a whole number")
@@ -197,7 +202,10 @@ def _read_python_whole(value: object) -> int:
 
 
 def as_float(value: float | Real) -> float:
-    """Return a number as a float, inf for an int above 1e308. Raises TypeError for no number."""
+    """Return a number as a float; an int that is too large for a float becomes inf or -inf.
+
+    Raises TypeError for a value that is not a number.
+    """
     try:
         return math.fsum([value])  # unlike float(value) it takes no text
     except OverflowError:
@@ -205,14 +213,17 @@ def as_float(value: float | Real) -> float:
 
 
 def positive(name: str, number: float) -> float:
-    """Return the argument called `name`. Raises InputError unless it is above 0 and finite."""
+    """Return a number that is above 0 and finite.
+
+    Raises InputError for any other number; `name` is the number's name in the message.
+    """
     if not 0.0 < number < math.inf:
         raise InputError(f"{name}: {number!r}; allowed: a number more than 0")
     return number
 
 
 def read_text(value: object) -> str:
-    """Return a text that is not blank. Raises TableError."""
+    """Return a text that is not blank. Raises TableError for any other value."""
     if not isinstance(value, str):
         raise invalid(f"{as_text(value)} is not text")
     if not value.strip():
@@ -252,15 +263,15 @@ def restricted(
     what: str = "{} is out of range",
     allowed_there: str = "",
 ) -> Kind:
-    """Return the kind of those values of a kind that fulfil a condition.
+    """Return a kind that allows only those values of `kind` that fulfil a condition.
 
     Parameters
     ----------
-    kind : the values to choose from.
+    kind : the kind to restrict. It reads the value.
     is_right : (value, as `kind` returns it) -> whether it is allowed.
-    allowed : what is allowed, for all messages.
+    allowed : the allowed values in words.
     what : the message for a value that `is_right` refuses; {} stands for the value.
-    allowed_there : what is allowed, in this message alone.
+    allowed_there : the allowed values in words after `what`; "" if they are `allowed` there, too.
     """
 
     def read(value: object) -> Any:
@@ -280,13 +291,13 @@ def within(
     at_most: float = math.inf,
     allowed: str = "",
 ) -> Kind:
-    """Return the kind of those numbers of a kind that lie within limits.
+    """Return a kind that allows only those numbers of `kind` that lie within limits.
 
     Parameters
     ----------
-    kind : the numbers to choose from.
+    kind : the kind of number to restrict.
     above, at_least, at_most : exclusive lower, inclusive lower and inclusive upper limit.
-    allowed : what is allowed; by default the limits are written behind what `kind` allows.
+    allowed : the allowed numbers in words; by default the words of `kind` and the limits.
     """
 
     def is_within(number: float) -> bool:
@@ -300,13 +311,14 @@ def within(
     return restricted(kind, is_within, allowed)
 
 
-# A finite number; the second one of Python code, which may not be in quotes.
+# Kinds of finite numbers. NUMBER may be arithmetic in quotes. The kinds whose names begin with
+# PYTHON are for values that Python code passes. PYTHON_WHOLE also allows whole floats.
 NUMBER = Kind(read_number, "a number{unit}")
 PYTHON_NUMBER = Kind(read_python_number, NUMBER.allowed)
 WHOLE = Kind(_read_whole, "a whole number{unit}")
 PYTHON_WHOLE = Kind(_read_python_whole, WHOLE.allowed)
 
-# Numbers of a rotor.
+# Kinds of numbers that describe a rotor or its loads.
 _SIZES = f"sizes from {SMALLEST:g} to {LARGEST:g}"
 SIZE = restricted(
     NUMBER,
@@ -330,26 +342,29 @@ FLAG = Kind(_read_flag, "true or false")
 
 
 def whole(lowest: int, highest: int, allowed: str = "") -> Kind:
-    """Return the kind of whole numbers from `lowest` to `highest`; `allowed`: in other words."""
+    """Return the kind of whole numbers from `lowest` to `highest`.
+
+    `allowed` says in words which numbers are allowed; by default it names the two limits.
+    """
     allowed = allowed or f"a whole number from {lowest} to {highest}"
     return within(WHOLE, at_least=lowest, at_most=highest, allowed=allowed)
 
 
 def choice(options: Sequence[object], allowed: str = "") -> Kind:
-    """Return the kind of a value that is one of some options.
+    """Return the kind of a value that is one of the given options.
 
     Parameters
     ----------
     options : the allowed values.
-    allowed : what is allowed, in words; by default the options.
+    allowed : the allowed values in words; by default a list of the options.
     """
     are_texts = all(isinstance(option, str) for option in options)
     names = [str(option) for option in options]
 
     def is_option(value: object) -> bool:
-        if not isinstance(value, Hashable):  # the comparison with an array has no truth value
+        if not isinstance(value, Hashable):  # an array: its comparison has no truth value
             return False
-        # True and 1 are equal, and are not the same choice.
+        # True and 1 are equal in Python, but are different options.
         is_flag = isinstance(value, bool)
         return any(value == option and isinstance(option, bool) is is_flag for option in options)
 
@@ -368,7 +383,7 @@ def choice(options: Sequence[object], allowed: str = "") -> Kind:
 
 
 def read_each(read: Callable[[Any], Any], values: Iterable[Any]) -> tuple[Any, ...]:
-    """Return every value, read. Raises TableError with the problems of all."""
+    """Return the results of `read` for all values. Raises TableError with all problems."""
     return tuple(_read_entries(read, enumerate(values)).values())
 
 
@@ -376,12 +391,12 @@ def _read_entries(
     read: Callable[[Any], Any],
     entries: Iterable[tuple[str | int, Any]],
 ) -> dict[Any, Any]:
-    """Return every value of a list or table by its place.
+    """Return the results of `read` for the entries of a list or table, by index or key.
 
     Parameters
     ----------
-    read : reads one value.
-    entries : place and value of each.
+    read : (value) -> the converted value.
+    entries : index or key, and value, of each entry.
 
     Raises
     ------
@@ -405,9 +420,9 @@ def list_of(kind: Kind, allowed: str, least: int = 0, most: int | None = None) -
 
     Parameters
     ----------
-    kind : of each entry.
-    allowed : what is allowed, in words.
-    least, most : how many entries it may have; None: any number.
+    kind : kind of each entry.
+    allowed : the allowed lists in words.
+    least, most : smallest and largest number of entries; None for no largest number.
     """
 
     def read(value: object) -> tuple[Any, ...]:
@@ -421,7 +436,7 @@ def list_of(kind: Kind, allowed: str, least: int = 0, most: int | None = None) -
 
 
 def dict_of(kind: Kind, allowed: str) -> Kind:
-    """Return the kind of a table of any keys, whose values are of one kind."""
+    """Return the kind of a table with any keys, in which every value is of kind `kind`."""
 
     def read(value: object) -> dict[str, Any]:
         if not isinstance(value, dict):
@@ -432,9 +447,10 @@ def dict_of(kind: Kind, allowed: str) -> Kind:
 
 
 def table_of(cls: type, allowed: str = "") -> Kind:
-    """Return the kind of a table with the keys that a dataclass declares, read as the dataclass.
+    """Return the kind of a table that is read as an instance of the dataclass `cls`.
 
-    Its __post_init__ may raise TableError for values that do not fit one another.
+    The table has the keys that the dataclass declares. The dataclass's __post_init__ may raise
+    TableError if the values contradict each other.
     """
     keys = declared_keys(cls)
 
@@ -451,24 +467,26 @@ def read_keys(
     tables: Mapping[str, Any],
     extra_check: Callable[[dict[str, Any]], Iterable[KeyProblem]] | None = None,
 ) -> dict[str, Any]:
-    """Return the values of a file's tables.
+    """Read the declared keys in a file's tables, and return their values.
+
+    The keys at the top of the file are read first, then those of each table, in the order in which
+    they are declared. A key whose kind is `in_context` depends on the values read before it.
 
     Parameters
     ----------
-    keys : metadata of the declared keys by field, as of `declared_keys`; in this order they are
-        read, so that a key in context finds those before it.
-    tables : as the file has them.
-    extra_check : (values that could be read, by field) -> what else is wrong with them.
+    keys : metadata of the declared keys by field, as `declared_keys` returns them.
+    tables : the parsed tables of the file.
+    extra_check : (values that were read without an error, by field) -> further problems of them.
 
     Returns
     -------
     dict
-        The values by field; that of a key which the file does not have is its default.
+        The values by field. If a key is missing in the file, its value is the default.
 
     Raises
     ------
     TableError
-        With everything that is wrong.
+        With all problems of the tables.
     """
     values: dict[str, Any] = {}
     problems: list[KeyProblem] = []
@@ -490,7 +508,7 @@ def read_keys(
                     values[field] = key["kind"].read(entries[name], *context)
                 except TableError as error:
                     problems += error.under(*path, name, allowed=key["allowed"])
-            # A table that has one key alone was written for it: without the key it is a mistake.
+            # If only one key is declared in a table, a table without this key is a mistake.
             elif "optional" in key and not (table in tables and len(fields) == 1):
                 values[field] = key["optional"]
             else:
@@ -505,7 +523,7 @@ def read_keys(
 
 
 def _fields_by_table(keys: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, str]]:
-    """Return the field of each key by table ("" for the top of the file) and name in it."""
+    """Return the fields by table and by name of the key in the table; "" is the top of the file."""
     fields: dict[str, dict[str, str]] = {"": {}}
     for field, key in keys.items():
         table, _, name = key["key"].rpartition(".")
@@ -518,7 +536,7 @@ def _unknown_names(
     entries: Mapping[str, Any],
     names: Sequence[str],
 ) -> list[KeyProblem]:
-    """Return a problem for each entry of the table at `path` whose name is none of `names`."""
+    """Return a problem for each entry of the table at `path` whose name is not in `names`."""
     problems = []
     for name in entries:
         if name not in names:

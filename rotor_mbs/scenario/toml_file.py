@@ -1,4 +1,4 @@
-"""Read TOML text with limits, write it, and find the line on which each key stands."""
+"""Read TOML files within limits, write TOML text, and find the line of each key."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from rotor_mbs.errors import InputError, shown_value
 KeyPath = tuple[str | int, ...]
 
 MAX_BYTES = 1 << 20
-# Largest number of lines for one file: a file of 1 MiB can have 300,000 errors.
+# Largest number of error lines for one file. A file of 1 MiB can have 300,000 errors.
 MAX_PROBLEMS = 100
 
-# A dotted key costs the TOML reader the square of its parts in time and memory: 1 MiB of "a.a.a."
-# would need terabytes. Nothing in a scene has more than two parts; the lookbehind keeps this search
-# itself linear.
+# For a dotted key, the time and memory of the TOML reader grow with the square of the number of
+# parts: 1 MiB of "a.a.a." would need terabytes. No key of a scene has more than two parts. The
+# lookbehind in `_LONG_KEY` keeps the time of this search proportional to the length of the text.
 _MAX_KEY_PARTS = 32
 _LONG_KEY = re.compile(
     r"(?<![A-Za-z0-9_-])"
@@ -38,7 +38,8 @@ _PART = r"[A-Za-z_][A-Za-z0-9_]{0,59}(?:\[[0-9]{1,6}\])*"
 _KEY = re.compile(rf"{_PART}(?:\.{_PART})*")
 _MARKS = frozenset("[]{}=,.\n")
 _TOKEN = re.compile(
-    # Strings of several lines, strings of one, marks and bare words; comments.
+    # In this order: strings over several lines, strings on one line, marks, bare words; comments,
+    # which are not in the captured group.
     r'("{3}(?:[^"\\]|\\.|"{1,2}(?!"))*"{3,5}|\'{3}(?:[^\']|\'{1,2}(?!\'))*\'{3,5}'
     r'|"(?:[^"\\\n]|\\.)*"|\'[^\'\n]*\''
     r"|[\[\]{}=,.\n]|[^\s\[\]{}=,.#\"']+)|#[^\n]*",
@@ -46,14 +47,15 @@ _TOKEN = re.compile(
 )
 
 
-# Kinds of files: what each is called, and the command that takes it.
+# The command that reads a kind of file. The keys are the names of the kinds in messages.
 _COMMANDS = {
     "a scene": "rotor-mbs run {}",
     "a sweep": "rotor-mbs sweep {}",
     "a mapping of columns": "rotor-mbs compare DATA --scene SCENE --columns {}",
     "a file of bounds": "rotor-mbs check FILE --bounds {}",
 }
-# Keys of which a mapping has one, unless it has tables with a column only.
+# Keys of a mapping of columns, other than its tables with a `column`. A mapping that has no such
+# table has one of these keys.
 _MAPPING_KEYS = frozenset(("time", "speed", "omit", "only", "program", "openfast", "group"))
 
 
@@ -62,9 +64,10 @@ class KeyProblem(NamedTuple):
 
     Attributes
     ----------
-    path : where it is, in the tables as they were read.
-    wrong, allowed : what is wrong, and what is allowed; "" for what the key allows.
-    is_of_key : whether it is the key that is wrong, whatever the value is.
+    path : path of the key in the tables that were read.
+    wrong : what is wrong.
+    allowed : what is allowed; "" stands for what the declaration of the key allows.
+    is_of_key : whether the key itself is wrong, so that no value is right for it.
     """
 
     path: KeyPath
@@ -80,19 +83,24 @@ class KeyProblem(NamedTuple):
 
 
 class TableError(InputError):
-    """Raised for tables of a file, or a value in them, before it is known where they stand."""
+    """Raised for errors in the tables of a file, or in a value, whose lines are not known yet.
+
+    Attributes
+    ----------
+    faults : the errors, with paths that begin at the table or value that was read.
+    """
 
     def __init__(self, faults: Iterable[KeyProblem]) -> None:
         self.faults = tuple(faults)
         super().__init__(fault.message for fault in self.faults)
 
     def under(self, *path: str | int, allowed: str = "") -> list[KeyProblem]:
-        """Return the problems as those of a value at a path.
+        """Return the problems with `path` in front of their own paths.
 
         Parameters
         ----------
-        *path : of the value.
-        allowed : what its key allows, for problems that do not say what is allowed.
+        *path : path of the value or table that was read.
+        allowed : what the key of the value allows, for problems that do not say what is allowed.
         """
         faults = []
         for fault in self.faults:
@@ -103,12 +111,13 @@ class TableError(InputError):
 
 @dataclass(frozen=True)
 class TomlFile:
-    """A TOML file that was read.
+    """The content of a TOML file.
 
     Attributes
     ----------
-    source : what messages call it.
-    text, tables : what it holds.
+    source : name of the file in messages.
+    text : the text of the file.
+    tables : the tables that were parsed from the text.
     """
 
     source: str
@@ -117,7 +126,7 @@ class TomlFile:
 
     @property
     def kind(self) -> str:
-        """Return which kind of file its keys show it to be, as in messages; "" where none."""
+        """Return the kind of the file by its keys, such as "a scene"; "" if they do not show it."""
         keys = self.tables.keys()
         if {"axis", "scene"} <= keys:
             return "a sweep"
@@ -134,11 +143,11 @@ class TomlFile:
         return ""
 
     def refuse_other_kind(self, wanted: str) -> None:
-        """Raise InputError, in one line, if the file is certainly of another kind.
+        """Raise InputError, in one line, if the keys of the file show that it is of another kind.
 
         Parameters
         ----------
-        wanted : the kind of file that is read.
+        wanted : the kind of file that the caller reads, such as "a scene".
         """
         kind = self.kind
         if kind and kind != wanted:
@@ -147,16 +156,16 @@ class TomlFile:
 
     @contextmanager
     def with_line_numbers(self, *path: str) -> Iterator[None]:
-        """Give every InputError of the block lines with the file and the line number.
+        """Add the file's name and line numbers to an InputError that is raised in the block.
 
         Parameters
         ----------
-        *path : of the key that the error is about.
+        *path : path of the key or table that is read in the block.
 
         Raises
         ------
         InputError
-            With lines `source:line: key: what is wrong; allowed: ...`, in the order of the file.
+            With lines `source:line: key: what is wrong; allowed: ...`, sorted by line number.
         """
         try:
             yield
@@ -177,7 +186,7 @@ class TomlFile:
 
 
 def file_path(path: str | os.PathLike[str]) -> Path:
-    """Return a path that a file can have, whether the file exists or not.
+    """Return a valid path of a file, which need not exist.
 
     Parameters
     ----------
@@ -186,10 +195,10 @@ def file_path(path: str | os.PathLike[str]) -> Path:
     Raises
     ------
     TypeError
-        If it is neither text nor a path.
+        If `path` is neither text nor a path.
     InputError
-        If no file can have it: it has a NUL or half a surrogate pair, or is too long for the
-        system.
+        If no file can have this path, as it contains a NUL or half a surrogate pair, or is too long
+        for the system.
     """
     path = Path(path)
     try:
@@ -206,13 +215,16 @@ def file_path(path: str | os.PathLike[str]) -> Path:
 
 
 def shown_path(path: Path) -> str:
-    """Return a path for a message, in ASCII where it cannot be printed."""
+    """Return a path for a message; a path that cannot be printed is written as an ASCII literal."""
     text = str(path)
     return text if text.isprintable() else ascii(text)
 
 
 def shown_key(path: KeyPath) -> str:
-    """Return a path as `Scene.replace` and sweeps take it: blade[1].mass; odd names in quotes."""
+    """Return the path of a key as text, as `Scene.replace` and sweeps take it: blade[1].mass.
+
+    A name that is long, or has characters other than letters, digits, - and _, is put in quotes.
+    """
     text = ""
     for part in path:
         if isinstance(part, int):
@@ -225,9 +237,9 @@ def shown_key(path: KeyPath) -> str:
 
 
 def parse_key(text: str) -> KeyPath:
-    """Return the parts of a path, ("initial", "angles", 1) of "initial.angles[1]".
+    """Return the path of a key from its text, ("initial", "angles", 1) from "initial.angles[1]".
 
-    Raises TableError where the text is no path.
+    Raises TableError if the text is not the path of a key.
     """
     if not _KEY.fullmatch(text):
         what = f"{text[:60]!a} is not the path of a key"
@@ -245,16 +257,17 @@ def read_toml(path: Path) -> TomlFile:
 
     Parameters
     ----------
-    path : of the file.
+    path : path of the file.
 
     Raises
     ------
     InputError
-        With one line: it cannot be read, is too large or empty, or is no TOML text in UTF-8.
+        With one line, if the file cannot be read, is larger than MAX_BYTES or empty, or is not TOML
+        text in UTF-8, or if `parse_toml` raises it.
     """
     shown = shown_path(path)
     try:
-        if path.exists() and not path.is_file():  # a pipe or a device would block, or never end
+        if path.exists() and not path.is_file():  # a pipe or a device may block, or never end
             kind = "a folder" if path.is_dir() else "not a regular file"
             raise InputError(f"{shown}: is {kind}; allowed: a TOML file")
         with path.open("rb") as file:
@@ -281,17 +294,18 @@ def read_toml(path: Path) -> TomlFile:
 
 
 def parse_toml(text: str, source: str) -> TomlFile:
-    """Return the tables of a TOML text.
+    """Parse a TOML text, and return it with its tables.
 
     Parameters
     ----------
     text : the content of a file.
-    source : its name in messages.
+    source : name of the file in messages.
 
     Raises
     ------
     InputError
-        With one line, if the text is not TOML, or is beyond the limits.
+        With one line, if the text is not TOML, or has a key of too many parts, tables nested too
+        deep, or a number of too many digits.
     """
     too_long = _LONG_KEY.search(text)
     if too_long:
@@ -307,13 +321,13 @@ def parse_toml(text: str, source: str) -> TomlFile:
         allowed = "allowed: tables and arrays of a scene"
         raise InputError(f"{source}:1: nested too deep; {allowed}") from error
     except ValueError as error:
-        # The reader does not convert this one to its own error: whole numbers of more digits than
-        # Python converts.
+        # The TOML reader raises a plain ValueError for a whole number of more digits than Python
+        # converts.
         raise InputError(f"{source}:1: a number is too long; allowed: |x| <= 1e300") from error
 
 
 def plain_value(value: Any) -> Any:
-    """Return a Python value as a TOML file has it; arrays and other iterables become lists.
+    """Convert a Python value to the types of a TOML file; arrays and other iterables become lists.
 
     Parameters
     ----------
@@ -322,16 +336,16 @@ def plain_value(value: Any) -> Any:
     Raises
     ------
     TypeError
-        For a value that no file can have, such as None or bytes.
+        For a value that a TOML file cannot contain, such as None or bytes.
     """
-    if hasattr(value, "tolist"):  # of NumPy
+    if hasattr(value, "tolist"):  # a NumPy array or number
         value = value.tolist()
     if isinstance(value, str | bool | int | float | date | time):
         return value
     if isinstance(value, Mapping):
         plain = {}
         for key, entry in value.items():
-            # A key that no file has is named in the error of an unknown key.
+            # A key that is not text becomes text, so that the error for an unknown key names it.
             name = str(key) if isinstance(key, str) else shown_value(key)
             plain[name] = plain_value(entry)
         return plain
@@ -341,7 +355,7 @@ def plain_value(value: Any) -> Any:
 
 
 def as_text(value: object) -> str:
-    """Return a value for a message as its file has it, short and on one line."""
+    """Return a value for a message, on one line: short values as in a TOML file, others named."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, int):
@@ -357,11 +371,13 @@ def as_text(value: object) -> str:
 
 
 def toml_value(value: object) -> str:
-    """Return a value as TOML text: numbers bit for bit, mappings as inline tables.
+    """Return a value as TOML text, in which mappings are inline tables.
+
+    A number that is read from the text is equal to the written number bit for bit.
 
     Parameters
     ----------
-    value : plain, see `plain_value`.
+    value : a value as `plain_value` returns it.
 
     Raises
     ------
@@ -384,20 +400,21 @@ def toml_value(value: object) -> str:
 
 
 def toml_lines(table: Mapping[str, object]) -> str:
-    """Return the entries of a table in TOML, a line each."""
+    """Return the entries of a table as TOML text with one line per entry."""
     return "".join(f"{key} = {toml_value(value)}\n" for key, value in table.items())
 
 
-# How the TOML reader's messages begin that are about a key or table of which there is one before.
+# Beginnings of the TOML reader's messages about a key or table that is repeated.
 _SAYS_TWICE = ("Cannot overwrite", "Cannot declare", "Cannot mutate", "Cannot redefine")
 
 
 def _repeated_key(text: str, line: int) -> str:
-    """Return which key is there twice, and its first line; "" where none is found.
+    """Return a message with the repeated key and its first line, or "" if none is found.
 
     Parameters
     ----------
-    text, line : that is no TOML, and the last line of the key that is there a second time.
+    text : text that the TOML reader refuses.
+    line : number of the line in which the second occurrence of the key ends.
     """
     located = list(_located("\n".join(text.split("\n")[:line])))
     path, own_line, _ = located[-1]
@@ -409,17 +426,17 @@ def _repeated_key(text: str, line: int) -> str:
 
 
 def _syntax_error(message: str, text: str) -> str:
-    """Return an error of the TOML reader in the form of this package's messages.
+    """Return a message of the TOML reader in the form of this package's messages.
 
     Parameters
     ----------
-    message : such as "Invalid value (at line 12, column 7)".
-    text : that it is about.
+    message : message of the reader, such as "Invalid value (at line 12, column 7)".
+    text : text that the reader refuses.
 
     Returns
     -------
     str
-        Such as "12: not TOML: invalid value (column 7)".
+        The text after the file's name, such as "12: not TOML: invalid value (column 7)".
     """
     match = re.fullmatch(r"(?s)(.*) \(at line (\d+), column (\d+)\)", message)
     if match:
@@ -434,17 +451,17 @@ def _syntax_error(message: str, text: str) -> str:
 
 
 def find_lines(text: str) -> dict[KeyPath, int]:
-    """Find the lines on which keys and array entries stand.
+    """Return the line numbers of the keys and array entries in a TOML text.
 
     Parameters
     ----------
-    text : valid TOML; of other texts some lines are missing or wrong.
+    text : valid TOML. For other text, line numbers may be missing or wrong.
 
     Returns
     -------
     dict
-        Line number, from 1, by path: ("blade", 1, "mass") is in the second [[blade]] table. Keys of
-        inline tables are not in it.
+        Line numbers, counted from 1, by path. The path ("blade", 1, "mass") is that of the mass in
+        the second [[blade]] table. The dict does not contain the keys in inline tables.
     """
     lines: dict[KeyPath, int] = {}
     for path, line, value in _located(text):
@@ -454,13 +471,16 @@ def find_lines(text: str) -> dict[KeyPath, int]:
 
 
 def _located(text: str) -> Iterator[tuple[KeyPath, int, Sequence[tuple[str, int]]]]:
-    """Yield each key and each table on the way to it, its line and the tokens of its value.
+    """Yield the path, the line number and the value's tokens of each key and each table header.
+
+    Each part of a dotted key or header is yielded first, without tokens: for `a.b = 1` the path of
+    a, then that of a.b.
 
     Parameters
     ----------
     text : the content of a TOML file; see `find_lines`.
     """
-    table_counts: dict[KeyPath, int] = {}  # of every array of tables
+    table_counts: dict[KeyPath, int] = {}  # tables so far in each array of tables
     table: KeyPath = ()
     for statement in _statements(text):
         is_header = statement[0][0] == "["
@@ -469,8 +489,8 @@ def _located(text: str) -> Iterator[tuple[KeyPath, int, Sequence[tuple[str, int]
         end = tokens.index("=") if "=" in tokens else len(tokens)
         path = () if is_header else table
         line = statement[0][1]
-        # Escapes in a quoted key are left as they are: its line is then the one of the table around
-        # it.
+        # Escapes in a quoted key are not decoded. `line_of` therefore does not find the key, and
+        # returns the line of the enclosing table.
         names = [(token, line) for token, line in statement[:end] if token not in _MARKS]
         for i, (name, line) in enumerate(names):
             path = (*path, name[1:-1] if name[0] in "\"'" else name)
@@ -488,7 +508,7 @@ def _located(text: str) -> Iterator[tuple[KeyPath, int, Sequence[tuple[str, int]
 def _statements(text: str) -> Iterator[list[tuple[str, int]]]:
     """Yield the tokens of each table header and each `key = value`, with their line numbers.
 
-    Newlines inside brackets are left out.
+    The tokens do not include newlines. A newline inside brackets does not end a statement.
 
     Parameters
     ----------
@@ -517,15 +537,15 @@ def _number_entries(
     value: Sequence[tuple[str, int]],
     lines: dict[KeyPath, int],
 ) -> None:
-    """Add the line of every entry of an array.
+    """Add the line number of every entry of an array to `lines`.
 
     Parameters
     ----------
-    path : of the array.
-    value : its tokens with their line numbers.
-    lines : by path; entries are added.
+    path : path of the array.
+    value : tokens of the array with their line numbers.
+    lines : line numbers by path.
     """
-    numbers: list[int] = []  # of the entry in each of the arrays around it
+    numbers: list[int] = []  # index of the current entry in each enclosing array
     for token, line in value:
         if token in "]}":
             if numbers:
@@ -540,7 +560,7 @@ def _number_entries(
 
 
 def line_of(lines: Mapping[KeyPath, int], path: KeyPath) -> int:
-    """Return the line of a path, else of the nearest key that encloses it, else 1."""
+    """Return the line of a path, else the line of the innermost enclosing table, else 1."""
     for length in range(len(path), 0, -1):
         if path[:length] in lines:
             return lines[path[:length]]
