@@ -303,7 +303,7 @@ def _call_with_files(
 
 
 def error_line(error: BaseException) -> str:
-    """Return an error of a method in one line, with the line of a method file that raised it."""
+    """Return an error of a method as one line, with file and line if a method file raised it."""
     return located(error, [file.path for file in _files.values()])
 
 

@@ -112,8 +112,8 @@ def problems_of_methods(values: Mapping[str, Any]) -> list[KeyProblem]:
 def problems_of_scene(values: Mapping[str, Any]) -> list[KeyProblem]:
     """Return the problems of the keys `methods` and `settings` in a scene file.
 
-    In a scene file, any method may have the setting. The settings in a sweep file are checked
-    elsewhere, because there a method of the sweep must have the setting.
+    Each setting in a scene file must be a setting of some method. The settings in a sweep file are
+    checked elsewhere, as they must be settings of the methods of the sweep.
     """
     problems = problems_of_methods(values)
     settings = dict(values.get("settings", ()))
@@ -130,7 +130,7 @@ def problems_of_scene(values: Mapping[str, Any]) -> list[KeyProblem]:
 
 @dataclass(frozen=True)
 class Refusal:
-    """A run that is left out: its method cannot represent the scene, or its settings do not fit it.
+    """A run that is left out because its method or its settings do not fit the scene.
 
     Attributes
     ----------
@@ -288,8 +288,8 @@ def recommend(scene: Scene, defaults: tuple[str, ...]) -> tuple[tuple[str, ...],
     Parameters
     ----------
     scene : the scene.
-    defaults : names of the default methods. All of them are selected for a scene that is not nearly
-        singular, stiff, fast or long.
+    defaults : names of the default methods. All of them are selected for a scene that is not
+        overdamped, nearly singular, stiff, fast or long.
 
     Returns
     -------

@@ -183,7 +183,7 @@ def only_scene(argument: str) -> Scene:
 
 
 def scene_of(given: Scene | str | os.PathLike[str]) -> Scene:
-    """Return `given` if it is a scene, otherwise the scene that this name or path means.
+    """Return `given` if it is a scene, otherwise the scene with this name or in this TOML file.
 
     Raises InputError if there is no such scene, and TypeError if `given` is neither a scene nor a
     name (text) nor a path.
