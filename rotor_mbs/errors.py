@@ -59,7 +59,7 @@ class StoreError(RotorError):
 
 
 class PlausibilityWarning(UserWarning):
-    """Issued for a number that is valid but implausible, as if in degrees, millimetres or tonnes."""
+    """Issued for a number valid but implausible: perhaps in degrees, millimetres or tonnes."""
 
 
 @contextmanager
