@@ -1,4 +1,7 @@
-"""Compare loads of another program with the closed form's at the data's states; find causes."""
+"""Compare loads of another program with those of the closed form at the same states.
+
+It also searches for the causes of differences.
+"""
 
 from __future__ import annotations
 
@@ -25,15 +28,16 @@ from rotor_mbs.solution.defects import FLOOR_SAFETY, Defects
 from rotor_mbs.solution.quantities import LOADS, longest_arm
 from rotor_mbs.solution.trajectory import Array, all_coordinates
 
-# Share of the largest force at a root. The errors of a component that is smaller are divided by
-# this share, not by the component's own largest value.
+# Errors of a component are divided by its largest value, but at least by this share of the largest
+# force at a root (for a moment, times the longest arm): a component near zero has no other scale.
 _SMALL = 1e-3
-_LOAD_ROUNDING = 16.0 * 2.0**-53  # of that force: rounding of the sums by which a load is computed
-_STATE_STEP = 1e-7  # relative step of a state, for the derivative of the loads
-_FEW_ROWS = 50  # in which another scene is tried first
-MIN_EXPLAINED = 5  # rows: with fewer, something always fits
-# What a mistake that is named may leave: shares of the largest load, or of a frequency, and of the
-# difference. It is the other program's own error.
+# Rounding of the sums by which a load is computed, relative to the largest force at a root.
+_LOAD_ROUNDING = 16.0 * 2.0**-53
+_STATE_STEP = 1e-7  # relative step of an angle or rate, for the derivative of the loads
+_FEW_ROWS = 50  # largest number of rows in which another scene is tried first, to save time
+MIN_EXPLAINED = 5  # least number of rows for a search; with fewer, some cause always fits
+# A mistake is named as a cause if it leaves at most MAX_LEFT of the largest load (of a frequency for
+# modes) and at most LEFT_SHARE of the difference. The rest is the other program's own error.
 MAX_LEFT = 1e-4
 LEFT_SHARE = 1e-2
 WHOLE = LoadParts()
@@ -48,22 +52,24 @@ _FORGOTTEN = {
     "without the dampers of the bearings": LoadParts(dampers=0.0),
     "without the pitch torques": LoadParts(torques=0.0),
 }
+# Mistakes in the unit of a column, by the factor between the column and the right numbers.
 _UNITS = {1.0: "", 1e-3: "kN taken as N", 1e3: "N taken as kN"}
 _FACTORS = [sign * factor for sign in (1.0, -1.0) for factor in _UNITS]
-# "" is the one that the scene's loads have: of a root the blade's, of the shaft the base.
+# "" is the frame of the scene's own loads: for loads on a root the blade's frame, for loads on the
+# shaft the base.
 _FRAMES = ("", "coned", "rotor", "shaft", "base")
 
 
 @dataclass(frozen=True)
 class LoadComparison:
-    """Result of a comparison of loads.
+    """Hold the result of a comparison of loads.
 
     Attributes
     ----------
     expected : (n, channels) N or N m, loads of the closed form.
-    errors : by channel.
-    message : why the loads are not right, "" where they are.
-    likely : causes.
+    errors : errors of each channel.
+    message : what is wrong with the loads; "" if they are right.
+    likely : likely causes of the differences, in words.
     """
 
     expected: Array
@@ -74,14 +80,15 @@ class LoadComparison:
 
 @dataclass(frozen=True)
 class Component:
-    """A component of loads that a column may be.
+    """Hold a component of loads that a column of the data may be.
 
     Attributes
     ----------
     factor : the column is this factor times `values`.
-    values : (n,) N or N m.
+    values : (n,) N or N m, the component.
     shown : " is <name>" if it is another component than the column's name says, else "".
-    is_shifted : whether it is late or early by a row, so that its first or last row is unknown.
+    is_shifted : whether the component is late or early by a row. Its first or last row is then
+        unknown.
     """
 
     factor: float
@@ -92,21 +99,23 @@ class Component:
 
 @dataclass(frozen=True)
 class JudgedLoads:
-    """Loads in the rows that are judged, and all that they may be mistaken for.
+    """Hold the loads in the rows that are judged, and the loads that common mistakes give.
 
     Attributes
     ----------
-    scene, channels : the scene, and the channels of the data.
-    known : all components of loads of the scene, as the columns of `by_frame`.
-    by_frame : by frame the (n, components) loads of the closed form.
-    mistaken : for each mistake, in words, the loads by frame that a program with this mistake has.
-    hub_weight : by frame the share of the hub's weight in the loads.
+    scene, channels : the rotor, and the load channels of the data.
+    known : channels of all load components of the scene, in the order of the columns of `by_frame`.
+    by_frame : for each frame the loads of the closed form, (n, components) N or N m.
+    mistaken : for each mistake, in words, the loads that a program with this mistake computes; by
+        frame as in `by_frame`.
+    hub_weight : for each frame the part of `by_frame` that is the hub's weight.
     time : (n,) s.
-    states : (n, 2 moving) angles and rates of the data, rad and rad/s.
-    is_inside : (n,) rows that are neither the first nor the last one.
-    values, rounding, expected : (n, channels) N or N m.
-    smallest_scale : (channels,) by which an error is judged at least.
-    tolerance : of a component's largest.
+    states : (n, m) rad and rad/s, angles, then rates of the data, for the coordinates that move.
+    is_inside : (n,) whether a row is neither the first nor the last one of the data.
+    values, rounding, expected : (n, channels) N or N m: numbers of the data, the differences that
+        rounding explains, and loads of the closed form.
+    smallest_scale : (channels,) N or N m, the least size that errors are divided by.
+    tolerance : largest allowed error, relative to the largest value of a component.
     """
 
     scene: Scene
@@ -130,19 +139,21 @@ class JudgedLoads:
         return distinct_frames(self.scene)
 
     def scale(self, j: int, component: Array) -> float:
-        """Return the size by which errors of channel j are judged if it is a component, (n,)."""
+        """Return the size that errors of channel j are divided by if it is `component`, (n,)."""
         largest = float(np.abs(component).max(initial=0.0))
         return max(largest, float(self.smallest_scale[j])) or 1.0
 
     def left(self, j: int, component: Component, *, may_vanish: bool = False) -> float:
-        """Return how far the error of a channel, taken as a component, exceeds the allowed one.
+        """Return by how much the error of a channel exceeds the allowed one if it is `component`.
+
+        The channel may be this component if the result is at most 0.
 
         Parameters
         ----------
         j : number of the channel.
         component : what the channel may be.
-        may_vanish : whether a component near zero is tried too; by default the result is infinite
-            for it, as it fits anything small.
+        may_vanish : whether a component near zero is tried, too. By default the result for such a
+            component is infinite, because it fits all small numbers.
         """
         factor, values = component.factor, component.values
         rounding = FLOOR_SAFETY * self.rounding[:, j] / min(abs(factor), 1)
@@ -167,18 +178,18 @@ def loads_by_frame(
     scene : the rotor.
     time : (n,) s.
     angles, rates : (n, 1 + blades) rad and rad/s, rotor first.
-    parts : factors of the weight and the inertia forces, to leave some of them out.
+    parts : factors of the terms that the loads consist of, to leave some of them out.
 
     Returns
     -------
     dict of ndarray
-        By frame, (n, components) N or N m in the order of `channels`. A load that has no components
-        in a frame is given in its own.
+        For each frame the loads, (n, components) N or N m in the order of `channels`. A load that
+        has no components in this frame has those in its own frame.
     """
     loads = sampled_loads(scene, time, angles, rates, parts)
     by_frame = {frame: dict(loads) for frame in _FRAMES}
-    # One rotation after the other: from the blade's frame by the pitch to the coned one, by the
-    # cone to the rotor's, by the azimuth to the shaft's, by the tilt to the base.
+    # The rotations follow one another. The pitch leads from the blade's frame to the coned frame,
+    # the cone to the rotor's frame, the azimuth to the shaft's frame, and the tilt to the base.
     azimuths = angles[:, :1] + np.array(scene.phases)
     cones = np.array([blade.cone for blade in scene.blades])
     for name, values in loads.items():
@@ -202,7 +213,7 @@ def loads_by_frame(
 
 
 def distinct_frames(scene: Scene) -> tuple[str, ...]:
-    """Return the frames that differ in a scene, "" for those of its own loads."""
+    """Return the frames that differ in a scene; "" is the frame of its own loads."""
     return tuple(frame for frame in _FRAMES if _plain_frame(scene, frame) == frame)
 
 
@@ -213,13 +224,13 @@ def shaft_direction(scene: Scene, frame: str) -> Array:
 
 
 def _plain_frame(scene: Scene, frame: str, of_shaft: bool = False) -> str:
-    """Return a frame, or the one that it is the same as in a scene without tilt or cone.
+    """Return a frame, or another frame that is the same if the scene has no tilt or no cone.
 
     Parameters
     ----------
     scene : the rotor, with tilt and cones.
     frame : one of `_FRAMES`.
-    of_shaft : whether it is that of a shaft load, whose own frame is the base.
+    of_shaft : whether a load on the shaft is given in this frame; its own frame is the base.
     """
     if frame == "coned" and not any(blade.cone for blade in scene.blades):
         return "rotor"
@@ -229,7 +240,7 @@ def _plain_frame(scene: Scene, frame: str, of_shaft: bool = False) -> str:
 
 
 def _turned(vectors: Array, angle: Array | float, axis: int) -> Array:
-    """Turn (..., 3) vectors about x (axis 0), y or z by (...) rad."""
+    """Return (..., 3) vectors turned about x (axis 0), y (1) or z (2) by (...) rad."""
     first, second = (axis + 1) % 3, (axis + 2) % 3
     turned = vectors.copy()
     turned[..., first] = np.cos(angle) * vectors[..., first] - np.sin(angle) * vectors[..., second]
@@ -240,16 +251,16 @@ def _turned(vectors: Array, angle: Array | float, axis: int) -> Array:
 def compare_loads(
     scene: Scene, loads: ForeignData, defects: Defects, tolerance: float
 ) -> LoadComparison:
-    """Compare each component of loads with the closed form's at the data's own states.
+    """Compare loads of data with the loads of the closed form at the data's own states.
 
-    Errors are relative to the component's largest value, beyond what the rounding of states and
-    loads explains. Rows at a jump of a prescribed load are left out, as a program may write the
-    value before the jump or after it.
+    The part of an error that the rounding of states and loads does not explain is divided by the
+    largest value of its component. Rows at a jump of a prescribed load are left out, because a
+    program may write the value before the jump or after it.
 
     Parameters
     ----------
     scene : the rotor.
-    loads : channels of loads alone, from the first row of `defects` on.
+    loads : channels of loads alone; their first row is that of `defects`.
     defects : interval defects of the motion of the data, with its states and their rounding.
     tolerance : largest allowed error, relative to a component's largest value.
     """
@@ -264,7 +275,7 @@ def compare_loads(
 def _loads_in_rows(
     scene: Scene, loads: ForeignData, defects: Defects, tolerance: float
 ) -> tuple[Array, JudgedLoads]:
-    """Compute the loads at the states of the data, and choose the rows that are judged.
+    """Compute the closed form's loads at the data's states, and choose the rows that are judged.
 
     Parameters
     ----------
@@ -275,7 +286,7 @@ def _loads_in_rows(
     expected : ndarray
         (rows, channels) N or N m, loads of the closed form in all rows.
     judged_loads : JudgedLoads
-        The rows that are judged.
+        The loads in the rows that are judged.
     """
     states, time, half = defects.states, defects.time, len(defects.moving)
     known = [channel for channel in channels(scene) if channel.is_load]
@@ -293,7 +304,7 @@ def _loads_in_rows(
 
     by_frame = loads_at(states)
     expected = columns_of(by_frame)
-    # The first components are those of the forces at the roots.
+    # The first components are the forces at the roots.
     forces = by_frame[""][:, : 3 * len(scene.blades)].reshape(len(time), -1, 3)
     largest_force = np.linalg.norm(forces, axis=2).max(axis=1)
     arms = np.ones(len(loads.channels))
@@ -301,8 +312,8 @@ def _loads_in_rows(
         if channel.kind == "moment":
             arms[j] = longest_arm(scene)
     rounding = loads.rounding[: len(time)] + _LOAD_ROUNDING * largest_force[:, None] * arms
-    # The states are rounded, too: the derivative of the loads by each of them, from a forward
-    # difference, gives what this makes of the loads.
+    # The states are rounded, too. The derivative of the loads by each angle and rate, a forward
+    # difference, times the rounding of this number is an uncertainty of the loads.
     for i in range(2 * half):
         step = _STATE_STEP * np.maximum(np.abs(states[:, i]), 1.0)
         moved = states.copy()
@@ -327,7 +338,7 @@ def _loads_in_rows(
         mistaken[f"every row is held for {period} rows"] = {
             frame: matrix[held] for frame, matrix in by_frame.items()
         }
-    # Of loads that are a row late or early, those of the first and last row are not known.
+    # If loads are a row late or early, the loads of the first or last row are unknown.
     is_inside = judged & (np.arange(len(time)) > 0) & (np.arange(len(time)) < len(time) - 1)
     judged_loads = JudgedLoads(
         scene=scene,
@@ -352,7 +363,7 @@ def _loads_in_rows(
 
 
 def is_at_jump(scene: Scene, time: Array) -> NDArray[np.bool_]:
-    """Return for each of (n,) times, s, whether a prescribed load of a scene jumps at it."""
+    """Return whether a prescribed load of a scene jumps at each of (n,) times in s."""
     at_jump = np.zeros(len(time), bool)
     for table in scene.load_tables:
         for (before, _), (after, _) in itertools.pairwise(table):
@@ -363,7 +374,7 @@ def is_at_jump(scene: Scene, time: Array) -> NDArray[np.bool_]:
 
 
 def _load_errors(loads: JudgedLoads) -> tuple[tuple[ChannelErrors, ...], list[int], str]:
-    """Judge each component of loads.
+    """Compute the errors of all load channels, and find the channels that are wrong.
 
     Parameters
     ----------
@@ -376,7 +387,8 @@ def _load_errors(loads: JudgedLoads) -> tuple[tuple[ChannelErrors, ...], list[in
     wrong : list of int
         Numbers of the channels that are wrong.
     message : str
-        What is wrong with the worst channel, "" where none is.
+        What is wrong with the worst channel, or that there is no row to judge; "" if all channels
+        are right.
     """
     errors, wrong = [], []
     message, largest = "", 0.0
@@ -400,7 +412,7 @@ def _load_errors(loads: JudgedLoads) -> tuple[tuple[ChannelErrors, ...], list[in
                 defect_unit="of the largest",
             )
         )
-        # Comparisons are negated, so that NaN is wrong.
+        # The comparisons are written with `not`, so that a NaN counts as wrong.
         if not worst <= loads.tolerance:
             wrong.append(j)
         if not worst <= max(loads.tolerance, largest):
@@ -415,7 +427,7 @@ def _load_errors(loads: JudgedLoads) -> tuple[tuple[ChannelErrors, ...], list[in
 
 
 def _explained(loads: JudgedLoads, wrong: Sequence[int]) -> tuple[str, ...]:
-    """Search for causes of the wrong components, each with the names of its channels.
+    """Search for the causes of wrong loads.
 
     Parameters
     ----------
@@ -425,7 +437,8 @@ def _explained(loads: JudgedLoads, wrong: Sequence[int]) -> tuple[str, ...]:
     Returns
     -------
     tuple of str
-        Causes in words; none where nothing fits.
+        A single cause, another scene, if it explains all wrong channels; else causes, each with the
+        names of the channels that it explains. Empty if nothing fits.
     """
     wrong = list(wrong)
     of_scene = _other_scene(loads, wrong)
@@ -447,13 +460,13 @@ def _explained(loads: JudgedLoads, wrong: Sequence[int]) -> tuple[str, ...]:
             unexplained.setdefault((_load(channel), channel.frame), []).append(j)
 
     named = _shared_texts(loads, by_channel)
-    # Moments that no component explains may be taken about another point, the same for all
-    # components of one load.
+    # Moments that no component explains may be taken about another point. All components of a load
+    # must have the same point.
     for (load, frame), group in unexplained.items():
         text = _other_point(loads, load, frame, group)
         if text:
             named.setdefault(text, []).extend(loads.channels[j].name for j in group)
-    exchanged = named.pop("", [])  # of another component, with nothing else wrong
+    exchanged = named.pop("", [])  # channels that are another component, with no other mistake
     for j, text in of_hub.items():
         named.setdefault(text, []).append(loads.channels[j].name)
     likely = []
@@ -465,10 +478,10 @@ def _explained(loads: JudgedLoads, wrong: Sequence[int]) -> tuple[str, ...]:
 
 
 def _other_scene(loads: JudgedLoads, wrong: Sequence[int]) -> str:
-    """Search for another scene that explains all wrong components at the data's states.
+    """Search for another scene whose loads at the data's states explain all wrong channels.
 
-    It comes before mistakes of single components: without tilt, for example, a component may by
-    chance be that of another frame.
+    Other scenes are tried before mistakes in single components: if the tilt is forgotten, for
+    example, a component may by chance equal one in another frame.
 
     Parameters
     ----------
@@ -478,7 +491,7 @@ def _other_scene(loads: JudgedLoads, wrong: Sequence[int]) -> str:
     Returns
     -------
     str
-        The cause, in words; "" where none explains all of them.
+        The cause, in words; "" if no scene explains all wrong channels.
     """
     if not wrong:
         return ""
@@ -507,9 +520,9 @@ def _is_explained_by(loads: JudgedLoads, other: Scene, wrong: Sequence[int]) -> 
     Parameters
     ----------
     loads : the rows that are judged.
-    other : the scene, with the coordinates of the data.
-    wrong : numbers of the channels that are wrong, which it must explain; the others must stay
-        right.
+    other : the other scene, in which the same coordinates move.
+    wrong : numbers of the wrong channels. The other scene must explain these channels, and the
+        right channels must be right with it, too.
     """
     right = _loads_of(loads, other)
     for j in range(len(loads.channels)):
@@ -534,7 +547,7 @@ def _loads_of(loads: JudgedLoads, other: Scene) -> Array:
 
 
 def _other_hub_mass(loads: JudgedLoads, wrong: Sequence[int]) -> dict[int, str]:
-    """Fit the mass of the hub, whose weight is in the forces on the shaft alone.
+    """Fit the mass of the hub to wrong forces on the shaft, the only loads with the hub's weight.
 
     Parameters
     ----------
@@ -544,8 +557,8 @@ def _other_hub_mass(loads: JudgedLoads, wrong: Sequence[int]) -> dict[int, str]:
     Returns
     -------
     dict
-        The cause in words by the number of each force on the shaft that is wrong; empty where no
-        mass, or none at all, explains all of them.
+        For the number of each wrong channel of the shaft's force, the cause in words. Empty if no
+        mass explains all of these channels, or if a mass of zero does.
     """
     scene = loads.scene
     forces = [j for j in wrong if _load(loads.channels[j]) == "shaft force"]
@@ -556,7 +569,7 @@ def _other_hub_mass(loads: JudgedLoads, wrong: Sequence[int]) -> dict[int, str]:
     difference = (loads.values - loads.expected)[:, forces]
     change = float((per_kg * difference).sum() / ((per_kg**2).sum() or 1.0))
     mass = scene.hub_mass + change
-    # A hub without mass is called by its own name: the weight that was forgotten.
+    # A hub without mass has a text of its own, see `_component_hypotheses`: without its weight.
     if mass <= MAX_LEFT * abs(change):
         return {}
     right = _loads_of(loads, replace(scene, hub_mass=mass))
@@ -569,8 +582,9 @@ def _other_hub_mass(loads: JudgedLoads, wrong: Sequence[int]) -> dict[int, str]:
 def _component_hypotheses(loads: JudgedLoads, j: int) -> Iterator[Hypothesis[Component]]:
     """Yield the components that a channel may be.
 
-    It may have another unit, sign, axis or frame; be another load; lack the hub's weight or have
-    the torque on the rotor in it; lack inertia forces; or be a row late or early.
+    The channel may have another unit, sign, axis or frame, or be another load. The hub's weight,
+    other weights or inertia forces may be missing, or the torque on the rotor may be included. The
+    channel may be late or early by a row, or hold its numbers over several rows.
 
     Parameters
     ----------
@@ -621,17 +635,18 @@ def _component_hypotheses(loads: JudgedLoads, j: int) -> Iterator[Hypothesis[Com
 def _shared_texts(
     loads: JudgedLoads, by_channel: Mapping[int, Sequence[Explanation[Component]]]
 ) -> dict[str, list[str]]:
-    """Choose one explanation for each channel: of several the one that most channels have.
+    """Choose one explanation for each channel: the one that most channels have in common.
 
     Parameters
     ----------
     loads : the rows that are judged.
-    by_channel : explanations by the number of the channel.
+    by_channel : explanations of each channel, by its number.
 
     Returns
     -------
     dict
-        By text of the explanation the channels' names, with the component that each is.
+        For the text of each explanation the names of its channels. A name is followed by
+        " is <name>" if the channel is another component.
     """
     shown_by_text: dict[int, dict[str, str]] = {}
     for j, explained in by_channel.items():
@@ -647,7 +662,7 @@ def _shared_texts(
 
 
 def _shared_names(loads: JudgedLoads, names: Sequence[str]) -> list[str]:
-    """Return names of channels, with the name of a load in place of all its components."""
+    """Return names of channels; one name of a load replaces the names of all its components."""
     by_load: dict[str, list[str]] = {}
     for channel in loads.channels:
         by_load.setdefault(_load(channel).rstrip("0123456789 "), []).append(channel.name)
@@ -661,7 +676,7 @@ def _shared_names(loads: JudgedLoads, names: Sequence[str]) -> list[str]:
 
 
 def _shared_exchanges(loads: JudgedLoads, exchanged: Sequence[str]) -> list[str]:
-    """Return exchanged columns, with a blade's load in place of all its components.
+    """Return texts on exchanged columns; one on a load replaces those on all its components.
 
     Parameters
     ----------
@@ -688,19 +703,20 @@ def _shared_exchanges(loads: JudgedLoads, exchanged: Sequence[str]) -> list[str]
 def _other_point(loads: JudgedLoads, load: str, frame: str, group: Sequence[int]) -> str:
     """Search for another point about which the moments of one load may be taken.
 
-    About a point p, the moment M of a force F is M - p × F = M + F × p.
+    With the moment M about the origin and the force F of a load, the moment about a point p is
+    M - p × F = M + F × p.
 
     Parameters
     ----------
     loads : the rows that are judged.
     load : name of the moment, such as "blade root moment 1".
-    frame : frame of its components, "" for its own.
-    group : numbers of its channels.
+    frame : frame of the moment's components in the data, "" for the scene's own frame.
+    group : numbers of the channels of this moment that are to be explained.
 
     Returns
     -------
     str
-        The point, in words; "" where none explains all of the channels.
+        The point, in words; "" if no point explains all of the channels.
     """
     force = _columns(loads, frame, load.replace("moment", "force"))
     axes = []
@@ -708,7 +724,7 @@ def _other_point(loads: JudgedLoads, load: str, frame: str, group: Sequence[int]
         component = loads.channels[j].name.partition(",")[0]
         axes.append("xyz".index(component[-1]))
     moment = _columns(loads, frame, load)[:, axes]
-    # (n, axes, 3): F × p is this matrix times p, its columns the products with the unit vectors.
+    # F × p is `matrix`, (n, axes, 3), times p. Its columns are the products of F with unit vectors.
     products = np.cross(force[:, None, :], np.eye(3)[None])
     matrix = products.transpose(0, 2, 1)[:, axes]
 
@@ -729,14 +745,15 @@ def _other_point(loads: JudgedLoads, load: str, frame: str, group: Sequence[int]
         for name, place in (("the centre of mass", blade.centre_of_mass), ("the tip", blade.tip)):
             for factor in _FACTORS:
                 add(name, np.array(place) - root, factor)
-    # Any other point follows by least squares from the wrong components, as M + F × p is linear in
-    # p; rcond leaves out the direction of a force that does not change.
+    # Any other point is fitted to the wrong components by linear least squares, because M + F × p
+    # is linear in p. If F keeps its direction, the coordinate of p along F is undetermined: with
+    # rcond it becomes zero.
     frame_name = _frame_name(loads.channels[group[0]], frame)
     for factor in _FACTORS:
         difference = (loads.values[:, group] / factor - moment).ravel()
         solution = np.linalg.lstsq(matrix.reshape(-1, 3), difference, rcond=1e-9)[0]
         point = np.asarray(solution, float)
-        # A coordinate that is within rounding is shown as 0.
+        # A coordinate that is zero but for rounding is shown as 0.
         point[np.abs(point) < 1e-9 * np.abs(point).max()] = 0.0
         shown = ", ".join(f"{x:.6g}" for x in point)
         radius = loads.scene.hub_radius + float(point[2])
@@ -773,14 +790,14 @@ def _load(channel: Channel) -> str:
 
 
 def _mistakes(factor: float) -> list[str]:
-    """Return the mistakes in a column that is a factor times the right one, in words."""
+    """Return in words the mistakes in a column that is `factor` times the right one."""
     mistakes = ["sign reversed (action in place of reaction)"] if factor < 0.0 else []
     unit = _UNITS[abs(factor)]
     return [*mistakes, unit] if unit else mistakes
 
 
 def _frame_name(channel: Channel, frame: str) -> str:
-    """Return a frame in words; "" is the channel's own."""
+    """Return the name of a frame in words; "" is the channel's own frame."""
     if frame:
         return frame
     return "blade's own" if channel.name.startswith("blade root") else "base"

@@ -1,4 +1,7 @@
-"""Compare a trajectory of another program, and its loads, with the reference at its times."""
+"""Compare a trajectory of another program with the reference, and its loads with the closed form.
+
+The reference is computed at the times of the trajectory.
+"""
 
 from __future__ import annotations
 
@@ -50,36 +53,40 @@ from rotor_mbs.solution.metrics import horizon, horizon_samples
 from rotor_mbs.solution.status import OK_ERROR
 from rotor_mbs.solution.trajectory import Array, Trajectory
 
-_TIME_ROUNDING = 1e-9  # share of the duration by which rounding may make a time exceed it
-_MIN_ROWS = 3
+# Times are rounded: a time that exceeds the duration by at most this share of it is inside.
+_TIME_ROUNDING = 1e-9
+_MIN_ROWS = 3  # fewer rows are too few to be compared
 _STAGES = 4  # reference, interval defects, search for causes, loads
-_SAME_START = 1e-3  # rad, rad/s: starts that differ by more are another start
-# A cause explains errors within the tolerance if at most this share of them is left.
+_SAME_START = 1e-3  # rad, rad/s: data whose first row differs by more have another initial state
+# If all errors are within the tolerance, a cause may leave at most this share of the largest one.
 _LEFT_OF_SMALL_ERRORS = 0.02
-# References that are kept for further data of the same scene and times: some of 20,000 rows take
-# 20 MB.
+# Largest number of references that are kept for further data of the same scene and times, and
+# largest number of rows of each. With three blades they take up to some 12 MB.
 _MAX_KEPT, _MAX_KEPT_ROWS = 4, 20_000
-_MAX_GAP = 1.5  # largest number of intervals without rows at the start or end of the motion
+# Longest part without rows at the start or end of the motion, in largest intervals between rows.
+_MAX_GAP = 1.5
 
 
 @dataclass(frozen=True)
 class ReferencedRows:
-    """Rows of data with what they should be.
+    """Hold the rows of data, and the reference in the same rows.
 
     Attributes
     ----------
-    data : rows within the scene's duration; wrapped channels begin in the turn of the reference.
-    compared : those of them that the reference reaches.
+    data : rows within the scene's duration. Whole turns are added to wrapped channels, so that
+        these begin in the same turn as the reference.
+    compared : the rows of `data` that the reference reaches; `rows` below is their number.
     exact : reference at the times of the data and at the scene's samples.
-    places : (rows,) rows of `exact` at the times of the data.
-    reference : reference at the rows.
-    expected : (rows, channels) what the channels of `compared` should be.
+    places : (rows,) indices in `exact` of the times of `compared`.
+    reference : reference at the times of `compared`.
+    expected : (rows, channels) numbers of the reference for the channels of `compared`.
     until : number of rows up to the horizon of the scene.
-    horizon_s : this horizon, s.
-    defects : interval defects of the data, None if unknown.
-    note : what a user must know of them.
+    horizon_s : horizon of the scene, s.
+    defects : interval defects of the data, None if they are unknown.
+    note : how the defects were found or why they are unknown, in words; may be "".
     rounding : (rows, channels) half a unit in the last digit of each number, plus `of_times`.
-    of_times : (rows, channels) change of each number by half a unit in the last digit of its time.
+    of_times : (rows, channels) change of each number if its time changes by half a unit in the
+        last digit.
     """
 
     data: ForeignData
@@ -98,19 +105,22 @@ class ReferencedRows:
 
 @dataclass(frozen=True)
 class TrajectoryErrors:
-    """Errors of data against the reference, by every measure that is judged.
+    """Hold the errors and defects of data, by all measures that are judged.
 
     Attributes
     ----------
-    channels : errors by channel.
-    error : (rows, channels) absolute errors, rad and rad/s.
-    per_growth : (rows, channels) errors per unit of the growth of an initial error.
-    excess_per_growth : (channels,) the largest of these up to the horizon, beyond rounding.
+    channels : largest error and defect of each channel.
+    error : (rows, channels) magnitudes of the errors against the reference, rad and rad/s.
+    per_growth : (rows, channels) `error` divided by `carried_errors`, the size to which a relative
+        error of 1 at the start may have grown.
+    excess_per_growth : (channels,) largest value of this quotient up to the horizon, for the part
+        of `error` beyond rounding.
     predicted, defect_time : see `DataVerdict`.
-    drift : rad, the largest sum of defects over a longer stretch of rows, beyond rounding.
-    drifting : its channel and number of rows, in words.
-    beyond_digits : the largest ratio of a defect, or of such a sum, to its own rounding.
-    missing : labels of coordinates without a column of angles.
+    drift : rad, the largest sum of defects over 10 or 100 rows (`STRETCHES`), beyond rounding.
+    drifting : channel and number of rows of `drift`, in words.
+    beyond_digits : the largest ratio of a defect, or of a sum of defects over `STRETCHES`, to what
+        rounding makes of it.
+    missing : labels of the coordinates whose angles the data lack.
     """
 
     channels: tuple[ChannelErrors, ...]
@@ -126,7 +136,7 @@ class TrajectoryErrors:
 
 
 @caller_signals()
-@np.errstate(all="ignore")  # numbers of data may be so large that they overflow
+@np.errstate(all="ignore")  # data may have so large numbers that the arithmetic overflows
 def compare_with_reference(
     data: ForeignData,
     scene: Scene,
@@ -136,22 +146,25 @@ def compare_with_reference(
 ) -> tuple[DataVerdict, Record]:
     """Compare a trajectory with the reference of a scene.
 
-    Three things are judged: the first row, the defects of all rows (each channel's against its own
-    rounding), and the errors up to the horizon. Then likely causes are searched for, also in data
-    that agree, whose small defects may be systematic.
+    The first row, the defects of all intervals and the errors up to the horizon are judged, each
+    beyond the rounding of its channel. Then likely causes of the differences are searched for. The
+    search includes data that agree, because their small defects may be systematic.
 
     Parameters
     ----------
-    data : angles and rates, some of which may be missing, and loads.
-    scene : the scene that the data are meant to be of.
-    tolerance : rad, the largest allowed defect of an interval beyond rounding.
-    time_limit_s : s, for the reference, the defects and the search.
-    on_stage : called as on_stage(name, done, stages) when a stage begins.
+    data : angles, rates and loads of another program; some channels may be missing.
+    scene : the scene with which the data are compared.
+    tolerance : rad, the largest allowed defect of an interval beyond rounding. The same number
+        bounds the other measures: the error of the first row, sums of defects, errors per unit of
+        error growth, and relative errors of loads.
+    time_limit_s : s, time limit for the reference, the defects and the search for causes.
+    on_stage : called as on_stage(name, done, stages) when a stage begins; `done` is the number of
+        stages before it.
 
     Returns
     -------
     DataVerdict, Record
-        The verdict; and the data with what they were compared with, for a file.
+        The verdict, and a record for a file: the data, the right values and the errors.
 
     Raises
     ------
@@ -159,7 +172,7 @@ def compare_with_reference(
         If the data have no row in the scene's duration, or the reference and the defects take
         longer than the time limit.
     """
-    is_available()  # loads the engine before the time limit, which could interrupt its import
+    is_available()  # imports heyoka here, as the time limit below could interrupt the import
     ends = monotonic() + time_limit_s
     loads, data = data.only(loads=True), data.only(loads=False)
     missing_part = "no reference"  # for the message at the time limit
@@ -260,30 +273,30 @@ def _reference_for(data: ForeignData, scene: Scene) -> tuple[ForeignData, TimedR
     """
     inside = data.rows(data.time <= scene.duration * (1.0 + _TIME_ROUNDING))
     end = float(np.max(inside.time, initial=scene.duration))
-    # The scene's samples are added to the times of the data, so that growth and horizon are the
-    # same for all data.
+    # The scene's samples are added to the times of the data, so that error growth and horizon do
+    # not depend on the rows of the data.
     samples = np.linspace(0.0, scene.duration, scene.samples)
     times = np.union1d(np.append(inside.time, end), samples)
     sampled_scene = replace(scene, duration=end, samples=len(times), outputs=("angles", "rates"))
     return inside, _reference_at(sampled_scene, times)
 
 
-_kept: dict[tuple[object, ...], TimedReference] = {}  # the latest last
+_kept: dict[tuple[object, ...], TimedReference] = {}  # ordered by last use, the latest at the end
 
 
 def _reference_at(scene: Scene, times: Array) -> TimedReference:
-    """Return the reference of a scene at given times, which earlier data may have had as well.
+    """Return the reference of a scene at given times, kept from an earlier call or computed.
 
     Parameters
     ----------
-    scene, times : as of `reference_at`.
+    scene, times : see `reference_at`.
 
     Raises
     ------
     OutOfTimeError
-        If it ended early, at the time limit: it is not used.
+        If the time limit ended the reference early. This reference is not kept.
     """
-    # How it is computed belongs to the key: with or without the engine.
+    # The key includes how the reference is computed: by which function, with or without heyoka.
     key = (reference_at, is_available(), scene, times.tobytes())
     exact = _kept.pop(key, None)
     if exact is None:
@@ -291,7 +304,7 @@ def _reference_at(scene: Scene, times: Array) -> TimedReference:
         raise_if_over()
         run = exact.trajectory
         for array in (run.time, run.angles, run.rates, exact.growth, exact.units):
-            array.flags.writeable = False  # others will read it
+            array.flags.writeable = False  # later calls return the same array
     if len(times) <= _MAX_KEPT_ROWS:
         _kept[key] = exact
         for old in list(_kept)[:-_MAX_KEPT]:
@@ -302,14 +315,14 @@ def _reference_at(scene: Scene, times: Array) -> TimedReference:
 def _rows_with_reference(
     data: ForeignData, scene: Scene, inside: ForeignData, exact: TimedReference
 ) -> ReferencedRows:
-    """Compute the defects of data, and find the reference at their times.
+    """Return the rows of data with the reference in the same rows, and compute their defects.
 
     Parameters
     ----------
     data : angles and rates, all rows.
     scene : the rotor and its duration.
     inside : the rows of `data` up to the scene's end.
-    exact : the reference at their times and at the scene's samples.
+    exact : the reference at the times of `inside` and at the scene's samples.
 
     Raises
     ------
@@ -330,15 +343,16 @@ def _rows_with_reference(
     if horizon_samples(run) < len(run.time):
         until = max(int(np.searchsorted(reference.time, horizon_s, side="right")), 1)
     expected = states_of(reference)[:, inside.columns]
-    # Wrapped channels get as many turns as the reference has in the first row.
+    # Whole turns are missing from a wrapped channel. They are added, so that its first row is in
+    # the same turn as the reference.
     turn = 2.0 * np.pi
     missing = turn * np.round((expected[0] - inside.values[0]) / turn)
     values = np.where(inside.wrapped, inside.values + missing, inside.values)
     inside = replace(inside, values=values)
     compared = inside.rows(slice(len(places)))
     defects, note = defects_of_data(scene, compared, reference, until)
-    # The time of a row is known to half a digit: the rates of change turn this into an
-    # uncertainty of the row's numbers.
+    # The time of a row is rounded to half a unit in its last digit. Multiplied by the rates of
+    # change, this rounding is an uncertainty of the row's numbers.
     changes = np.zeros((len(places), 2 * len(scene.initial_angles)))
     moving = scene.moving_coordinates
     columns = [*moving, *(len(scene.initial_angles) + i for i in moving)]
@@ -363,13 +377,13 @@ def _rows_with_reference(
 def _errors_of(
     data: ForeignData, scene: Scene, tolerance: float, rows: ReferencedRows
 ) -> TrajectoryErrors:
-    """Measure the errors and defects of data against their reference.
+    """Compute the errors of data against the reference, and measures of their defects.
 
     Parameters
     ----------
-    data : angles and rates; only which channels they have matters here.
-    scene : names the coordinates.
-    tolerance : rad, of an interval's defect.
+    data : angles and rates; only the list of their channels is used here.
+    scene : the rotor, with the labels of its coordinates.
+    tolerance : rad, the largest allowed defect of an interval.
     rows : the data with their reference.
     """
     error = np.abs(rows.compared.values - rows.expected)
@@ -379,9 +393,9 @@ def _errors_of(
         predicted = float(np.abs(rows.defects.predicted[: rows.until]).max())
     sums = _largest_sums(scene, rows.defects)
     beyond_digits = _beyond_digits(scene, tolerance, rows.defects)
-    # Errors are divided by the growth of an initial error. Faults that are below the tolerance in
-    # each interval may add up to an error above it. Where the growth is small, the quotient is
-    # above the tolerance, too.
+    # Errors are divided by the growth of an error of the initial state. Faults that are below the
+    # tolerance in each interval may add up to an error above it. Where the growth is small, such an
+    # error stays above the tolerance after the division.
     exact = rows.exact
     carried = carried_errors(exact.trajectory, exact.growth, exact.units)
     carried = carried[rows.places][:, data.columns]
@@ -402,11 +416,11 @@ def _errors_of(
 
 
 def _channel_errors(scene: Scene, rows: ReferencedRows, error: Array) -> tuple[ChannelErrors, ...]:
-    """Return the largest errors and defects of each channel.
+    """Return the largest error and defect of each channel.
 
     Parameters
     ----------
-    scene : says which coordinate a channel is of.
+    scene : the rotor, whose coordinates the channels belong to.
     rows : the data with their reference.
     error : (rows, channels) absolute errors, rad and rad/s.
     """
@@ -416,8 +430,8 @@ def _channel_errors(scene: Scene, rows: ReferencedRows, error: Array) -> tuple[C
         known = defects_of_channel(scene, rows.defects, channel)
         if known is not None and rows.defects is not None and rows.defects.is_resolved.any():
             sizes, floors = known
-            # Judged as those of a run: what is allowed grows with the length of an interval and
-            # the error growth over it.
+            # Defects of data are judged like those of a run: the allowed defect grows with the
+            # length of an interval and with the error growth over the interval.
             beyond_rounding = np.maximum(sizes - FLOOR_SAFETY * floors, 0.0)
             excess = rows.defects.in_bound_units(beyond_rounding)
             defect = float(excess[rows.defects.is_resolved].max())
@@ -437,18 +451,18 @@ def _channel_errors(scene: Scene, rows: ReferencedRows, error: Array) -> tuple[C
 
 
 def _largest_interval(defects: Defects) -> int:
-    """Return the number of the interval whose defect is largest relative to what is allowed."""
+    """Return the index of the interval whose defect is largest relative to the allowed defect."""
     excess = defects.in_bound_units(defects.channel_excess).max(axis=1)
     return int(np.where(defects.is_resolved, excess, 0.0).argmax())
 
 
 class LargestSums(NamedTuple):
-    """Sums of defects over longer stretches of rows.
+    """Hold the largest sums of defects over `STRETCHES`, numbers of successive rows.
 
     Attributes
     ----------
     drift, drifting : see `TrajectoryErrors`.
-    beyond_digits : the largest sum over its own rounding.
+    beyond_digits : the largest ratio of a sum to what rounding makes of it.
     """
 
     drift: float = 0.0
@@ -457,14 +471,14 @@ class LargestSums(NamedTuple):
 
 
 def _largest_sums(scene: Scene, defects: Defects | None) -> LargestSums:
-    """Find the largest sums of defects over stretches of rows.
+    """Find the largest sums of defects over `STRETCHES`, numbers of successive rows.
 
-    A drift may be below the tolerance in each interval, and above it in their sum.
+    The defects of a drift may be below the tolerance in each interval although their sum is above.
 
     Parameters
     ----------
-    scene : names the coordinates.
-    defects : interval defects of the data, None where they are not known.
+    scene : the rotor, with the labels of its coordinates.
+    defects : interval defects of the data, None if they are unknown.
     """
     largest = LargestSums()
     if defects is None:
@@ -485,15 +499,15 @@ def _largest_sums(scene: Scene, defects: Defects | None) -> LargestSums:
 
 
 def _beyond_digits(scene: Scene, tolerance: float, defects: Defects | None) -> float:
-    """Return the largest ratio of an interval's defect to its rounding; 0 without defects.
+    """Return the largest ratio of a defect to what rounding makes of it; 0 if none is known.
 
-    Rounding alone makes a ratio of at most 3: a larger one is systematic, though the defect may be
-    far below the tolerance.
+    Rounding alone gives a ratio of at most 3 (`FLOOR_SAFETY`). A larger ratio shows a systematic
+    error, even if the defect is far below the tolerance.
 
     Parameters
     ----------
     scene, tolerance : see `compare_with_reference`.
-    defects : interval defects of the data, None where they are not known.
+    defects : interval defects of the data, None if they are unknown.
     """
     if defects is None:
         return 0.0
@@ -526,11 +540,11 @@ def _findings(
 def _wrong_first_row(
     tolerance: float, rows: ReferencedRows, errors: TrajectoryErrors
 ) -> Iterator[tuple[str, str]]:
-    """Yield the largest deviation of the first row from the reference, if it is too large.
+    """Yield a finding if the first row deviates too much from the reference.
 
     Parameters
     ----------
-    tolerance : rad and rad/s, beyond rounding.
+    tolerance : rad and rad/s, the largest allowed deviation beyond rounding.
     rows, errors : the data with their reference, and their errors.
     """
     compared = rows.compared
@@ -544,14 +558,14 @@ def _wrong_first_row(
 
 
 def _wrong_defects(tolerance: float, errors: TrajectoryErrors) -> Iterator[tuple[str, str]]:
-    """Yield the channels whose defects are above the tolerance, and a drift above it.
+    """Yield a finding for each channel whose defect is too large, and for a drift that is.
 
     Parameters
     ----------
-    tolerance : rad, beyond rounding.
+    tolerance : rad, the largest allowed defect, and sum of defects, beyond rounding.
     errors : errors and defects of the data.
     """
-    # Comparisons are negated, so that NaN is wrong.
+    # The comparisons are written with `not`, so that a NaN counts as too large.
     known = [channel for channel in errors.channels if channel.defect is not None]
     for channel in sorted(known, key=lambda channel: -(channel.defect or 0.0)):
         if not (channel.defect or 0.0) <= tolerance:
@@ -566,11 +580,11 @@ def _wrong_defects(tolerance: float, errors: TrajectoryErrors) -> Iterator[tuple
 def _wrong_errors(
     tolerance: float, rows: ReferencedRows, errors: TrajectoryErrors
 ) -> Iterator[tuple[str, str]]:
-    """Yield the largest error up to the horizon where it is too large.
+    """Yield findings if errors up to the horizon are too large, per unit of growth or in size.
 
     Parameters
     ----------
-    tolerance : rad per unit of error growth.
+    tolerance : rad, the largest allowed error per unit of error growth.
     rows, errors : the data with their reference, and their errors.
     """
     worst = int(errors.excess_per_growth.argmax())
@@ -583,7 +597,7 @@ def _wrong_errors(
     # The bound is for angles; it is applied to rates where the data have no angles.
     angles = [channel for channel in errors.channels if channel.unit == "rad"]
     largest = max(angles or errors.channels, key=lambda channel: channel.error_max)
-    # Without defects the errors alone are judged, and by the smaller bound.
+    # If no defects are known, only the errors can be judged: then the tolerance is their bound.
     has_defects = any(channel.defect is not None for channel in errors.channels)
     bound = OK_ERROR if has_defects else tolerance
     bound += FLOOR_SAFETY * float(rows.rounding[: rows.until].max(initial=0.0))
@@ -595,12 +609,12 @@ def _wrong_errors(
 def _missing_rows(
     data: ForeignData, scene: Scene, rows: ReferencedRows
 ) -> Iterator[tuple[str, str]]:
-    """Yield which parts of the scene's motion the data have no rows of.
+    """Yield findings if the rows of the data do not cover the scene's motion.
 
     Parameters
     ----------
     data : angles and rates, all rows.
-    scene : the scene, whose duration is to be covered.
+    scene : the scene, with its duration.
     rows : the rows of `data` with their reference.
     """
     time, count = rows.reference.time, len(rows.places)
@@ -620,11 +634,11 @@ def _missing_rows(
 def _unchecked_parts(
     data: ForeignData, rows: ReferencedRows, errors: TrajectoryErrors
 ) -> Iterator[tuple[str, str]]:
-    """Yield which rows and coordinates of the data cannot be checked.
+    """Yield findings on rows and coordinates of the data that cannot be checked.
 
     Parameters
     ----------
-    data : angles and rates, of which the omitted ones may be missing.
+    data : angles and rates; channels that a mapping file omits may be missing.
     rows, errors : the data with their reference, and their errors.
     """
     defects, until = rows.defects, rows.until
@@ -662,7 +676,7 @@ def _notes_on_rows(
     Parameters
     ----------
     data : angles and rates, all rows.
-    scene : the scene, after whose end no rows are compared.
+    scene : the scene; rows after its end are not compared.
     rows, errors : the data with their reference, and their errors.
     """
     notes = [rows.note] if rows.note else []
@@ -685,7 +699,7 @@ def _notes_on_rows(
 
 
 def _note_on_start(data: ForeignData, rows: ReferencedRows) -> list[str]:
-    """Return a note for data that start in another state than the scene, at t = 0."""
+    """Return a note if the data begin at t = 0 in another state than the scene; else no note."""
     if data.time[0] != 0.0:
         return []
     different = []
@@ -708,12 +722,12 @@ def _likely_causes(
     *,
     is_ok: bool,
 ) -> list[str]:
-    """Search for likely causes of the differences, in words.
+    """Return likely causes of the differences, in words.
 
-    In data that do not agree, mistakes in columns and times are searched for, then other models.
-    In data that agree, small mistakes are searched for if a defect is larger than the digits of the
-    data explain; then another model, which may be recognized from defects that are small but
-    correlated.
+    If the data do not agree, mistakes in columns and times are searched for first, then other
+    models. If the data agree, mistakes in columns and times are searched for only if a defect is
+    larger than the digits of the data explain. If none is found, other models are tried, because
+    small defects that are correlated may reveal one.
 
     Parameters
     ----------
@@ -727,7 +741,7 @@ def _likely_causes(
         has_rates = bool(np.isin(rates, data.columns).any())
         judged = judged_defects(scene, rows.defects, tolerance, has_fitted_rates=not has_rates)
     # All rows are searched, also those after the scene's duration.
-    turned = rows.data.values[0] - data.values[0]  # the turns that wrapped channels were given
+    turned = rows.data.values[0] - data.values[0]  # whole turns, added to wrapped channels
     whole = replace(data, values=data.values + turned)
     worst = float(errors.per_growth[: rows.until].max())
     if is_ok:
