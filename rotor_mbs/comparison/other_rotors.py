@@ -1,4 +1,4 @@
-"""Candidates for a cause: other scenes and equations, and parameters of a scene that may be off."""
+"""Yield candidates for the cause of a difference: other scenes, equations and parameters."""
 
 from __future__ import annotations
 
@@ -25,21 +25,22 @@ from rotor_mbs.scenario.scene import Blade, Scene, scene_fields
 from rotor_mbs.scenario.time_table import LoadTable, is_constant, value_at
 from rotor_mbs.solution.trajectory import Array
 
-_GRAVITIES = (9.8, 9.80665, 9.81, 9.82, 10.0, 32.174, 0.0)
-# Azimuths and pitch angles that are often chosen as zero, by degrees.
+_GRAVITIES = (9.8, 9.80665, 9.81, 9.82, 10.0, 32.174, 0.0)  # m/s²; 32.174 is in ft/s²
+# Azimuths and pitch angles at which other programs often place the zero: rad, by degrees.
 _QUARTERS = {90: math.pi / 2.0, 180: math.pi, 270: -math.pi / 2.0}
-# Directions of gravity in the base that have the same effect on the motion as those azimuths.
+# For each zero of the azimuth, the direction of gravity in the base with the same effect on the
+# motion.
 _GRAVITY_AT_QUARTER = {90: "+x", 180: "+z", 270: "-x"}
-_SAME_START = 1e-3  # rad, rad/s: a scene that starts farther off cannot be the one
-_MAX_BLADES = 6  # that are tried one by one
-# Fields of a scene with an entry per blade, and their keys.
+_SAME_START = 1e-3  # rad, rad/s: a scene whose initial state differs by more is not a candidate
+_MAX_BLADES = 6  # largest number of blades for which the blades are also tried one by one
+# Fields of a scene with an entry per blade, and their keys in a scene file.
 _BEARING_FIELDS = {
     "bearing_stiffness": "bearing.stiffness",
     "bearing_damping": "bearing.damping",
     "pitch_torque": "torque.pitch",
     "bearing_rest": "bearing.rest",
 }
-# Fields of a scene that may be forgotten, or enter with another factor.
+# Fields of a scene that a program may forget or multiply by a factor, and their names in words.
 _FORGOTTEN = {
     "rotor_torque": "the torque of the rotor",
     "pitch_torque": "the pitch torques",
@@ -50,15 +51,18 @@ _FORGOTTEN = {
     "hub_inertia": "the hub's inertia",
     "shaft_tilt": "the tilt of the shaft",
 }
-# Of these a scene may have negative values; of the others, equations.
+# A scene can have the fields of _SIGNED with the opposite sign. Those of _DISSIPATING cannot be
+# negative in a scene: their sign is reversed in the equations.
 _SIGNED = ("rotor_torque", "pitch_torque", "bearing_rest")
 _DISSIPATING = ("bearing_stiffness", "bearing_damping", "shaft_damping")
-# Fields that no motion depends on, and those that are changed by an angle, not by a share.
+# Fields that affect loads but not the motion, and fields that are changed by an angle, not by a
+# share.
 _IN_LOADS_ALONE = ("hub_radius", "hub_mass")
 _LEANING_FIELDS = ("shaft_tilt", "cone")
-# Factors of terms in the equations of motion that are easily wrong.
+# Wrong factors of a load, a property or a term in the equations, by their name in words.
 _FACTORS = {"without": 0.0, "half of": 0.5, "twice": 2.0, "opposite sign of": -1.0}
-# Other units of torques, springs and dampers: the factor of the number, and the confusion.
+# Mistakes in the units of torques, springs and dampers: the factor by which the number is wrong,
+# and the mistake in words.
 _IN_KILONEWTONS = ((1e-3, "in kN m taken as N m"), (1e3, "in N m taken as kN m"))
 _PER_DEGREE = (
     (math.pi / 180.0, "per degree taken as per rad"),
@@ -77,32 +81,34 @@ _UNITS = {
         ),
     ),
 }
-_POUND = 0.45359237  # kg
+_POUND = 0.45359237  # kg in a pound
 _LOADS = {
     "rotor_torque": "torque of the rotor",
     "pitch_torque": "pitch torques",
     "bearing_rest": "rest angles of the springs",
 }
-_CYCLES = (2, 5, 10, 20, 50)  # rows, over which a controller may hold its loads
-# rows, by which loads may be late
+_CYCLES = (2, 5, 10, 20, 50)  # numbers of rows over which a controller may hold its loads
+# Numbers of rows by which loads may be late.
 _DELAYS = (1, 2, 3, 4, 5, 8, 10, 15, 20, 25, 30, 40, 50, 75, 100)
-# E3 is the power of a term that is zero without E2.
+# Sets of the paper's errata that have different effects. E3 is never without E2: it is the power of
+# a term that is zero without E2.
 _ERRATA = ("E1", "E2", "E1 and E2", "E2 and E3", "E1 and E2 and E3")
 
-Path = Sequence[str | int]  # names of fields and numbers of entries, from a scene to a number
+# The way from a scene to one of its numbers: names of fields and indices of entries.
+Path = Sequence[str | int]
 
 
 @dataclass(frozen=True)
 class RotorModel:
-    """A scene, with its blades at other azimuths, or with other equations.
+    """Hold a scene, if needed with other azimuths of blades, other equations or a coarse method.
 
     Attributes
     ----------
     scene : the rotor.
-    azimuths : (blades,) rad, None for those of the scene.
-    equations : accelerations in place of the closed form's, None for these.
-    method, steps : a method that is not exact, None for one that is, and the number of its steps
-        from row to row.
+    azimuths : (blades,) rad, azimuths of the blades; None for `Scene.phases`.
+    equations : function for the accelerations; None for that of the closed form.
+    method, steps : step of an integration method with an error of its own, None for an exact
+        integration; number of its steps from row to row.
     """
 
     scene: Scene
@@ -112,7 +118,7 @@ class RotorModel:
     steps: int = 1
 
     def accelerations(self) -> Accelerations | None:
-        """Return the equations, None for the closed form's own.
+        """Return the function for the accelerations, None for that of the closed form.
 
         Raises
         ------
@@ -124,12 +130,12 @@ class RotorModel:
 
 @dataclass(frozen=True)
 class Parameter:
-    """A number of the scene that may be off.
+    """Hold a number of the scene that may be wrong, and a function that changes it.
 
     Attributes
     ----------
-    key : its key in the scene file, or what it is, in words.
-    unit : of its change, "" where this is a share of the number.
+    key : key of the number in a scene file, or its name in words.
+    unit : unit of a change; "" if a change is a share of the number.
     apply : called as apply(model, change), returns the changed model.
     """
 
@@ -139,7 +145,7 @@ class Parameter:
 
 
 def rotor_hypotheses(scene: Scene) -> Iterator[Hypothesis[RotorModel]]:
-    """Yield the other scenes and equations with which a scene is easily confused.
+    """Yield hypotheses with common mistakes in a scene or in its equations of motion.
 
     Parameters
     ----------
@@ -149,8 +155,9 @@ def rotor_hypotheses(scene: Scene) -> Iterator[Hypothesis[RotorModel]]:
         if other != scene:
             yield Hypothesis(text, RotorModel(other))
     for sense, sign in (("-", 1.0), ("+", -1.0)):
-        # Only the direction of gravity in the shaft's axes matters, and a tilt turns it. Where tips
-        # and loads are is another matter: this is none of the other scenes.
+        # The motion depends only on the direction of gravity in the shaft's axes, which a tilt
+        # turns. A tilt also turns tips and loads, so this is not one of `other_scenes`, which are
+        # used for tips and loads, too.
         tilted = replace(scene, shaft_tilt=scene.shaft_tilt + sign * math.pi / 2.0)
         yield Hypothesis(f"gravity along {sense}y of the base", RotorModel(tilted))
     for text, azimuths in other_azimuths(scene):
@@ -186,7 +193,7 @@ def scenes_with_start(scene: Scene, first: Array) -> Iterator[Hypothesis[RotorMo
     Parameters
     ----------
     scene : the scene that is not yielded.
-    first : (2 (1 + blades),) angles, rad, then rates, rad/s, rotor first.
+    first : (2 (1 + blades),) initial state: angles, rad, then rates, rad/s, rotor first.
     """
     for other in _catalogue():
         start = np.array([*other.initial_angles, *other.initial_rates])
@@ -207,7 +214,7 @@ def _catalogue() -> tuple[Scene, ...]:
 
 
 def _small_angles(angles: Any, rates: Any, form: Any, loads: Any, *_: Any) -> list[Any]:
-    """Return the closed form's accelerations with the sine and cosine of small angles."""
+    """Return the closed form's accelerations with sin x = x and cos x = 1."""
     return closed_form.accelerations(
         angles, rates, form, loads, lambda x: x, lambda x: 1.0 + 0.0 * x
     )
@@ -218,20 +225,21 @@ def _with_factor(factor: float, reduced: Accelerations) -> Accelerations:
 
     Parameters
     ----------
-    factor : of the terms.
+    factor : factor of the terms.
     reduced : the equations without these terms.
     """
 
     def equations(*arguments: Any) -> list[Any]:
         whole, without = closed_form.accelerations(*arguments), reduced(*arguments)
-        # The accelerations are linear in the factor: 1 for the whole equations, 0 for the reduced.
+        # The accelerations are linear in the factor. With 1 they are those of the whole equations,
+        # with 0 those of the reduced equations.
         return [factor * a + (1.0 - factor) * b for a, b in zip(whole, without, strict=True)]
 
     return equations
 
 
 def _with_moments(moments: Callable[..., tuple[Any, Sequence[Any]]]) -> Accelerations:
-    """Return the closed form's equations with other generalized forces.
+    """Return the closed form's equations with additional moments.
 
     Parameters
     ----------
@@ -250,12 +258,13 @@ def _with_moments(moments: Callable[..., tuple[Any, Sequence[Any]]]) -> Accelera
 
 
 def _with_reactions(torques: float, springs: float, dampers: float) -> Accelerations:
-    """Return equations in which moments on the pitches react on the rotor.
+    """Return the closed form's equations with reactions of pitch moments on the rotor.
+
+    The reactions are those that would act if the pitch axes were along the shaft.
 
     Parameters
     ----------
-    torques, springs, dampers : 1 for those whose reactions are as if the pitch axes were along the
-        shaft, 0 for the others.
+    torques, springs, dampers : 1 if moments of this kind have such a reaction, 0 if not.
     """
 
     def moments(angles: Any, rates: Any, form: Any, loads: Any) -> Any:
@@ -269,19 +278,19 @@ def _with_reactions(torques: float, springs: float, dampers: float) -> Accelerat
 
 
 def _quadratic_dampers(_angles: Any, rates: Any, form: Any, _loads: Any) -> Any:
-    """Return the moments that make the bearings' dampers quadratic in the rate, in rad/s."""
+    """Return the additional moments with which bearing dampers are quadratic in the rate, N m."""
     pairs = zip(form.blades, rates[1:], strict=True)
     return 0.0, [blade.damping * rate * (1.0 - np.abs(rate)) for blade, rate in pairs]
 
 
 def _quadratic_shaft_damper(_angles: Any, rates: Any, form: Any, _loads: Any) -> Any:
-    """Return the moment that makes the shaft's damper quadratic in the rate, in rad/s."""
+    """Return the additional moment with which the shaft's damper is quadratic in the rate, N m."""
     moment = form.shaft_damping * rates[0] * (1.0 - np.abs(rates[0]))
     return moment, [0.0] * len(form.blades)
 
 
 def _sine_springs(angles: Any, rates: Any, form: Any, loads: Any) -> Any:
-    """Return the moments that make the bearings' springs act by the sine of the deflection."""
+    """Return the additional moments with which springs act by the sine of the deflection, N m."""
     moments = []
     for blade, theta, _, _, rest in closed_form.pitches(form, angles, rates, loads):
         deflection = theta - rest
@@ -290,7 +299,7 @@ def _sine_springs(angles: Any, rates: Any, form: Any, loads: Any) -> Any:
 
 
 def _reduced_equations(scene: Scene) -> Iterator[tuple[str, Accelerations]]:
-    """Yield terms of the equations of motion, and the equations without each.
+    """Yield terms of the equations of motion in words, each with the equations without it.
 
     Parameters
     ----------
@@ -315,7 +324,7 @@ def _reduced_equations(scene: Scene) -> Iterator[tuple[str, Accelerations]]:
 
 
 def _equations_of(scene: Scene) -> Accelerations:
-    """Return the closed form's equations of a scene, whatever the form they are called with."""
+    """Return the closed form's equations of a scene; they ignore the form in their arguments."""
     own = rotor_form(scene)
     return lambda angles, rates, _form, *rest: closed_form.accelerations(angles, rates, own, *rest)
 
@@ -325,8 +334,9 @@ def _with_moments_of(other: Scene, *, rotor: float = 0.0, pitches: float = 0.0) 
 
     Parameters
     ----------
-    other : the same rotor with other moments, but the same mass matrix.
-    rotor, pitches : 1 where the equations of the rotor or the pitches have the other's moments.
+    other : a scene with the same mass matrix and other moments.
+    rotor, pitches : 1 if the rotor's equation, or the equations of the pitches, have the moments of
+        `other`; 0 if not.
     """
     others = _equations_of(other)
 
@@ -342,7 +352,7 @@ def _with_moments_of(other: Scene, *, rotor: float = 0.0, pitches: float = 0.0) 
 
 
 class _MassMatrix:
-    """The mass matrix at some angles: rows are the rotor's, then the pitches'.
+    """Hold the mass matrix at given angles; the first row is the rotor's, the others the pitches'.
 
     Parameters
     ----------
@@ -364,7 +374,7 @@ class _MassMatrix:
             self.couplings.append(coupling)
 
     def times(self, accelerations: Sequence[Any]) -> list[Any]:
-        """Return the moments, N m, for accelerations, rad/s²."""
+        """Return the matrix times accelerations, rad/s², which are moments, N m."""
         rotor, *pitches = accelerations
         moments = [self.inertia * rotor]
         for inertia, coupling, pitch in zip(self._pitches, self.couplings, pitches, strict=True):
@@ -373,7 +383,7 @@ class _MassMatrix:
         return moments
 
     def solve(self, moments: Sequence[Any]) -> list[Any]:
-        """Return the accelerations, rad/s², for moments, N m."""
+        """Return the accelerations, rad/s², that given moments cause, N m."""
         reduced, (moment, *others) = self.inertia, moments
         for inertia, coupling, other in zip(self._pitches, self.couplings, others, strict=True):
             reduced = reduced - coupling * coupling / inertia
@@ -390,12 +400,13 @@ def _with_coupling(factor: float) -> Accelerations:
 
     Parameters
     ----------
-    factor : of the entries of the mass matrix between rotor and pitches.
+    factor : factor of the entries of the mass matrix that couple rotor and pitches.
     """
 
     def equations(angles: Any, rates: Any, form: Any, *rest: Any) -> list[Any]:
         matrix = _MassMatrix(angles, form)
-        # The right mass matrix times the right accelerations are the other terms.
+        # The right mass matrix times the right accelerations gives the moments of all other terms,
+        # which stay as they are.
         moments = matrix.times(closed_form.accelerations(angles, rates, form, *rest))
         matrix.couplings = [factor * coupling for coupling in matrix.couplings]
         return matrix.solve(moments)
@@ -418,7 +429,7 @@ def _without_gyroscopic_moments(scene: Scene, tensors: Sequence[Array]) -> Accel
         on_pitches = []
         for i, theta, rate in zip(moving, angles[1:], rates[1:], strict=True):
             cone = scene.blades[i].cone
-            # The shaft in the axes of the blade.
+            # Unit vector along the shaft, in the axes of the blade.
             shaft = np.array(
                 [
                     math.cos(cone) * np.sin(theta),
@@ -437,7 +448,8 @@ def _without_gyroscopic_moments(scene: Scene, tensors: Sequence[Array]) -> Accel
     return _with_moments(moments)
 
 
-# Equations with one mistake, of methods by Lagrange's equations or by Newton's and Euler's.
+# Equations with one mistake that is easily made in a derivation by Lagrange's equations or by those
+# of Newton and Euler.
 _OTHER_EQUATIONS = {
     "pitch torques with reactions on the rotor": _with_reactions(1.0, 0.0, 0.0),
     "moments of the pitch bearings with reactions on the rotor": _with_reactions(1.0, 1.0, 1.0),
@@ -458,9 +470,9 @@ def _printed(
     Parameters
     ----------
     scene : the rotor.
-    errata : which errors of the print are left in.
-    angles, rates, _form, loads : see `closed_form.accelerations`; each an array of (n,), or a
-        number.
+    errata : the errors of the print that are not corrected.
+    angles, rates, _form, loads : see `closed_form.accelerations`; each angle, rate and load is an
+        array, (n,), or a number.
 
     Raises
     ------
@@ -480,11 +492,11 @@ def _printed(
 
 
 def other_scenes(scene: Scene) -> Iterator[tuple[str, Scene]]:
-    """Yield scenes with one common mistake, and the mistake in words.
+    """Yield common mistakes in words, each with the scene that has this mistake.
 
     Parameters
     ----------
-    scene : the rotor as it is; some of the scenes may be equal to it.
+    scene : the rotor as it is. Some of the yielded scenes may be equal to it.
     """
     for gravity in _GRAVITIES:
         yield f"gravity of {gravity:g} m/s^2", replace(scene, gravity=gravity)
@@ -508,11 +520,11 @@ def other_scenes(scene: Scene) -> Iterator[tuple[str, Scene]]:
         springs = (scene.bearing_stiffness[0], *(0.0 for _ in scene.bearing_stiffness[1:]))
         yield "a spring at blade 1 alone", replace(scene, bearing_stiffness=springs)
     count = len(scene.blades)
-    if count > 2:  # of two blades this is twice the hub's inertia, which is yielded above
+    if count > 2:  # with two blades this is twice the hub's inertia, which is yielded above
         hubs = replace(scene, hub_inertia=count * scene.hub_inertia)
         yield "the hub's inertia once for each blade", hubs
     if not scene.has_constant_loads:
-        # A program that reads the loads once for each segment reads all at the kinks of any.
+        # A program that reads the loads once per segment reads all loads at the kinks of each load.
         times = [0.0, *scene.kink_times, scene.duration]
         yield "ramps of loads held at their value at the start", with_held_loads(scene, times)
     for degrees, angle in _QUARTERS.items():
@@ -523,20 +535,22 @@ def other_scenes(scene: Scene) -> Iterator[tuple[str, Scene]]:
 def by_rows(
     scene: Scene, times: Array, intervals: NDArray[np.int64]
 ) -> Iterator[Hypothesis[RotorModel]]:
-    """Yield methods with steps that divide rows, and loads that are held or late by rows.
+    """Yield hypotheses that depend on the rows: coarse methods, and loads that are held or late.
 
     Parameters
     ----------
     scene : the rotor as it is.
-    times : (n,) s, of all rows.
-    intervals : (k,) numbers of the intervals in which loads have to be held.
+    times : (n,) s, times of all rows.
+    intervals : (k,) numbers of the intervals on which hypotheses are tried. Loads are held in these
+        intervals; elsewhere they need not be.
     """
     step = float(times[-1] - times[0]) / (len(times) - 1)
     for text, method, steps in coarse_methods(step):
         yield Hypothesis(text, RotorModel(scene, method=method, steps=steps))
     if scene.has_constant_loads:
         return
-    # Of a single kind of loads this is among the other scenes.
+    # The first hypothesis, which changes all loads, is skipped: held ramps of all loads are among
+    # `other_scenes`.
     held = _with_tables(scene, _held_from_row_to_row)
     how = "held from row to row of their tables"
     yield from itertools.islice(_with_loads_of(scene, held, how), 1, None)
@@ -556,13 +570,13 @@ def by_rows(
 
 
 def _with_loads_of(scene: Scene, other: Scene, how: str) -> Iterator[Hypothesis[RotorModel]]:
-    """Yield a scene with all loads of another one, and with each kind of them alone.
+    """Yield a scene with all changed loads of another scene, then with each kind of them alone.
 
     Parameters
     ----------
     scene : the rotor as it is.
-    other : the same rotor with other loads.
-    how : the loads are changed, in words.
+    other : the same rotor with changed loads.
+    how : how the loads are changed, in words.
     """
     changed = {}
     for field in _LOADS:
@@ -574,7 +588,7 @@ def _with_loads_of(scene: Scene, other: Scene, how: str) -> Iterator[Hypothesis[
     if len(changed) > 1:
         yield Hypothesis(f"loads {how}", RotorModel(replace(scene, **changed)))
     for field, value in changed.items():
-        # If it is the only load that changes over time, "loads" says no less.
+        # If only one kind of load changes over time, the name "loads" says enough.
         name = _LOADS[field] if len(changed) > 1 else "loads"
         yield Hypothesis(f"{name} {how}", RotorModel(replace(scene, **{field: value})))
 
@@ -589,12 +603,12 @@ def _with_late_loads(scene: Scene, delay: float) -> Scene:
 
 
 def with_held_loads(scene: Scene, times: Sequence[float]) -> Scene:
-    """Return a scene whose loads are constant from each of some times, s, to the next."""
+    """Return a scene whose loads are constant from each of the given times, s, to the next."""
     return _with_tables(scene, functools.partial(_held, times))
 
 
 def _with_tables(scene: Scene, change: Callable[[LoadTable], LoadTable]) -> Scene:
-    """Return a scene with a change in the table of each load."""
+    """Return a scene in which the table of each load is replaced by `change(table)`."""
     return replace(
         scene,
         rotor_torque=change(scene.rotor_torque),
@@ -608,7 +622,8 @@ def _with_damped_error(scene: Scene) -> Scene:
 
     Parameters
     ----------
-    scene : the rotor, with rest angles that may change. The moment is added to the pitch torques.
+    scene : the rotor, whose rest angles may change over time. The moment of a damper due to the
+        rate of the rest angle is added to the pitch torque.
     """
     count = len(scene.blades)
     torques = scene.pitch_torque or ((),) * count
@@ -623,14 +638,14 @@ def _with_damped_error(scene: Scene) -> Scene:
             moment = damping * 2.0 * (value_at(rest, middle) - value_at(rest, start))
             moment /= end - start
             first = value_at(torque, start)
-            last = 2.0 * value_at(torque, middle) - first  # before a jump at the end
+            last = 2.0 * value_at(torque, middle) - first  # the value before a jump at the end
             table += [(start, first + moment), (end, last + moment)]
         damped.append(tuple(table))
     return replace(scene, pitch_torque=tuple(damped))
 
 
 def _held(times: Sequence[float], table: LoadTable) -> LoadTable:
-    """Return a load that keeps its value at each of some times, s, until the next."""
+    """Return a load that keeps the value that it has at each of the times, s, until the next."""
     held: list[tuple[float, float]] = []
     for start, end in itertools.pairwise(times):
         value = value_at(table, start)
@@ -647,12 +662,12 @@ def _held_from_row_to_row(table: LoadTable) -> LoadTable:
 
 
 def _single_blades(scene: Scene) -> range:
-    """Return the numbers of the blades that are tried one by one: none where there are many."""
+    """Return the numbers of the blades that are tried one by one; none if there are too many."""
     return range(len(scene.blades) if len(scene.blades) <= _MAX_BLADES else 0)
 
 
 def _other_blades(scene: Scene) -> Iterator[tuple[str, Scene]]:
-    """Yield scenes with another mass, centre of mass or inertia of blades, and what it is in words.
+    """Yield mistakes in the numbers of blades, in words, each with the scene that has it.
 
     Parameters
     ----------
@@ -722,7 +737,9 @@ def _exchanged(values: tuple[Any, ...], i: int, j: int) -> tuple[Any, ...]:
 
 
 def _exchanged_bearings(scene: Scene) -> Iterator[tuple[str, Scene]]:
-    """Yield scenes in which blades have springs, dampers, torques or rest angles of others.
+    """Yield mistakes in words, each with a scene in which blades have bearings of other blades.
+
+    The scenes differ in springs, dampers, pitch torques or rest angles.
 
     Parameters
     ----------
@@ -749,14 +766,16 @@ def _exchanged_bearings(scene: Scene) -> Iterator[tuple[str, Scene]]:
         yield "stiffness and damping of bearing 1 at all blades", replace(scene, **first)
 
 
-# Wrong elements xx yy zz xy xz yz of the inertia about the centre of mass, from the right ones
-# and Steiner's share of the inertia about the apex.
+# Mistakes in the inertia of a blade. Each function returns the wrong elements xx yy zz xy xz yz
+# about the centre of mass. Its arguments are the right elements, and Steiner's share: what must be
+# added to them for the inertia about the apex.
 _PRODUCTS = np.array([0.0, 0.0, 0.0, 1.0, 1.0, 1.0])
 _INERTIAS: Mapping[str, Callable[[Array, Array], Array]] = {
     "products of inertia about the centre of mass ignored": lambda own, _: own * (1.0 - _PRODUCTS),
     "blades without inertia, as point masses": lambda own, _: 0.0 * own,
     "products of inertia with opposite sign": lambda own, _: own * (1.0 - 2.0 * _PRODUCTS),
-    # Steiner's share is added again when the tensor is moved to the apex.
+    # The share is added when the tensor is moved to the apex. The sum of products, own + share,
+    # then has the opposite sign if twice the sum is subtracted before.
     "products of inertia about the root with opposite sign": lambda own, share: (
         own - 2.0 * _PRODUCTS * (own + share)
     ),
@@ -775,8 +794,8 @@ def _steiner(blade: Blade, farther: float = 0.0) -> Array:
 
     Parameters
     ----------
-    blade : with its mass and centre of mass.
-    farther : m, by which this is farther from the apex.
+    blade : the blade, of which mass and centre of mass are used.
+    farther : m, distance by which the centre of mass is moved away from the apex.
     """
     x, y, z = blade.centre_of_mass
     z += farther
@@ -797,7 +816,7 @@ def _with_weight_on_axis(blade: Blade) -> Blade:
 
 
 def other_azimuths(scene: Scene) -> Iterator[tuple[str, tuple[float, ...]]]:
-    """Yield wrong azimuths of the blades, (blades,) rad, and the mistake in words.
+    """Yield mistakes in words, each with the wrong azimuths of the blades, (blades,) rad.
 
     Parameters
     ----------
@@ -815,7 +834,7 @@ def other_azimuths(scene: Scene) -> Iterator[tuple[str, tuple[float, ...]]]:
             yield "blades at multiples of 120 degrees", of_three
     if count > 2:
         yield "blades numbered in the opposite sense", (right[0], *right[:0:-1])
-    # Of three blades such an exchange is the opposite sense.
+    # With three blades this exchange is the opposite sense, which is yielded above.
     for i, j in itertools.combinations(range(1, count if 3 < count <= _MAX_BLADES else 0), 2):
         exchanged = _exchanged(right, i, j)
         if exchanged[1:] != right[:0:-1]:
@@ -834,14 +853,14 @@ def other_azimuths(scene: Scene) -> Iterator[tuple[str, tuple[float, ...]]]:
         yield f"rotor angle from another zero: {place}", turned
 
 
-# Numbers that are off
+# Parameters that may be wrong
 
 
 def parameters(scene: Scene) -> Iterator[Parameter]:
-    """Yield the parameters of a scene that may be off, the zeros of its angles among them.
+    """Yield the parameters of a scene that may be wrong, including the zeros of its angles.
 
-    A number that is zero is not changed by a share, and left out. The parameters of blades are
-    yielded for all blades at once, and for each blade where there are at most `_MAX_BLADES`.
+    A number that is zero is left out, because a share does not change it. The parameters of blades
+    are yielded for all blades at once, and also for each blade if there are 2 to `_MAX_BLADES`.
 
     Parameters
     ----------
@@ -851,7 +870,7 @@ def parameters(scene: Scene) -> Iterator[Parameter]:
         value = getattr(scene, item.name)
         if item.name in ("blades", *_IN_LOADS_ALONE, *_LEANING_FIELDS):
             continue
-        # A zero, or no number, is not changed by a share.
+        # A share changes neither a zero nor a value that is not a number.
         if _scaled(value, 1.0) != value:
             yield Parameter(item.metadata["key"], "", _share_of([(item.name,)]))
     yield Parameter("shaft.tilt", "rad", _tilt_moved)
@@ -869,7 +888,7 @@ def _blade_parameters(scene: Scene, chosen: list[int], number: str) -> Iterator[
     ----------
     scene : the rotor as it is.
     chosen : numbers of the blades, from 0.
-    number : of a single blade among several, as in its key, "[0]"; else "".
+    number : index of a single blade as it stands in a key, "[0]"; "" for all blades.
     """
     for field in fields(Blade):
         if field.name in ("tip", *_LEANING_FIELDS):  # the tip is in no equation
@@ -915,12 +934,12 @@ def _share_of(paths: Sequence[Path]) -> Callable[[RotorModel, float], RotorModel
 
 
 def _tilt_moved(model: RotorModel, change: float) -> RotorModel:
-    """Tilt the shaft by a change in rad."""
+    """Return a model whose shaft's tilt is larger by a change in rad."""
     return replace(model, scene=replace(model.scene, shaft_tilt=model.scene.shaft_tilt + change))
 
 
 def _cone_moved(chosen: Sequence[int], model: RotorModel, change: float) -> RotorModel:
-    """Increase the cone of some blades by a change in rad."""
+    """Return a model in which the cone of some blades is larger by a change in rad."""
     blades = list(model.scene.blades)
     for i in chosen:
         blades[i] = replace(blades[i], cone=blades[i].cone + change)
@@ -928,7 +947,7 @@ def _cone_moved(chosen: Sequence[int], model: RotorModel, change: float) -> Roto
 
 
 def _azimuth_moved(chosen: Sequence[int], model: RotorModel, change: float) -> RotorModel:
-    """Turn some blades about the shaft, by a change in rad."""
+    """Return a model with larger azimuths of some blades, by a change in rad."""
     azimuths = list(model.azimuths or model.scene.phases)
     for blade in chosen:
         azimuths[blade] += change
@@ -936,7 +955,7 @@ def _azimuth_moved(chosen: Sequence[int], model: RotorModel, change: float) -> R
 
 
 def _damped_by_rotor(model: RotorModel, change: float) -> RotorModel:
-    """Add a share of the rotor's rate to the rates at which the bearings' dampers act."""
+    """Return a model whose bearing dampers act on pitch rate plus a share of the rotor's rate."""
 
     def equations(angles: Any, rates: Any, form: Any, loads: Any, *functions: Any) -> list[Any]:
         pitches = list(loads.pitches or [0.0] * len(form.blades))
@@ -949,7 +968,7 @@ def _damped_by_rotor(model: RotorModel, change: float) -> RotorModel:
 
 
 def _rest_moved(chosen: Sequence[int], model: RotorModel, change: float) -> RotorModel:
-    """Move the rest angles of some blades' springs at all times, by a change in rad."""
+    """Return a model with larger rest angles of some blades' springs, by a change in rad."""
     scene = model.scene
     rests = list(scene.bearing_rest or (((0.0, 0.0),),) * len(scene.blades))
     for blade in chosen:
@@ -958,12 +977,15 @@ def _rest_moved(chosen: Sequence[int], model: RotorModel, change: float) -> Roto
 
 
 def _zero_moved(chosen: Sequence[int], model: RotorModel, change: float) -> RotorModel:
-    """Move the zero of the pitch of some blades by a change in rad."""
+    """Return a model in which the zero of the pitch of some blades is moved by a change in rad."""
     return replace(model, scene=_pitch_turned(model.scene, chosen, change))
 
 
 def _pitch_turned(scene: Scene, chosen: Sequence[int], angle: float) -> Scene:
-    """Turn some blades about their pitch axes, by an angle in rad, in their position at pitch 0."""
+    """Return a scene whose blades `chosen` are turned about their pitch axes, by an angle in rad.
+
+    The pitch angles stay as they are: centre of mass and inertia are turned in the blade's frame.
+    """
     s, c = math.sin(angle), math.cos(angle)
     turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     blades = list(scene.blades)
@@ -976,13 +998,13 @@ def _pitch_turned(scene: Scene, chosen: Sequence[int], angle: float) -> Scene:
 
 
 def _scaled_at(scene: Scene, paths: Sequence[Path], share: float) -> Scene:
-    """Make the values at some paths of a scene larger by a share.
+    """Return a scene in which the values at some paths are larger by a share.
 
     Parameters
     ----------
     scene : the rotor.
-    paths : names of fields and numbers of entries, from the scene to a value.
-    share : a value becomes 1 + share times itself.
+    paths : the ways from the scene to the values.
+    share : a value v becomes (1 + share) v.
     """
 
     def with_value(whole: Any, path: Path) -> Any:
@@ -999,16 +1021,16 @@ def _scaled_at(scene: Scene, paths: Sequence[Path], share: float) -> Scene:
 
 
 def _scaled(value: Any, share: float) -> Any:
-    """Make a number, or the numbers of a tuple or the loads of a table, larger by a share."""
+    """Return a number, the numbers of a tuple or the loads of a table, larger by a share."""
     if not isinstance(value, tuple):
         return value * (1.0 + share) if isinstance(value, float) else value
     if value and all(_is_row(row) for row in value):
-        # Of a table over time the torques or angles, not the times.
+        # In a table over time only the torques or angles are scaled, not the times.
         return tuple((time, number * (1.0 + share)) for time, number in value)
     return tuple(_scaled(entry, share) for entry in value)
 
 
 def _is_row(value: Any) -> bool:
-    """Return whether a value is a row of a table over time."""
+    """Return whether a value is a row of a table over time: a time and a number."""
     is_pair = isinstance(value, tuple) and len(value) == 2
     return is_pair and not isinstance(value[0], tuple)
