@@ -1,4 +1,4 @@
-"""The search for likely causes of data that do not agree: what is searched for, in which order."""
+"""Search for the likely causes of differences, in a fixed order, if data do not agree."""
 
 from __future__ import annotations
 
@@ -18,28 +18,32 @@ from rotor_mbs.comparison.data_mistakes import (
 from rotor_mbs.comparison.defect_search import QUICK_SEARCH, DefectSearch
 from rotor_mbs.comparison.faults import faults_in_time
 
-_SAME_START = 1e-3  # rad, rad/s: data that differ more at the start are no run of the scene
-_LONG = 2.0  # times the scene's duration: of longer data causes are always searched for
-_CORRELATED = 3.0  # times the standard deviation of the correlation of independent numbers
+_SAME_START = 1e-3  # rad, rad/s: data whose first row differs by more start in another state
+# Data longer than this many times the scene's duration are searched even if all their errors and
+# defects are small: their times may be in another unit.
+_LONG = 2.0
+# Errors are correlated if their correlation is larger than this many times the standard deviation
+# that it would have for independent numbers.
+_CORRELATED = 3.0
 
 
 def likely_causes(search: TrajectorySearch, judged: JudgedDefects | None) -> list[str]:
-    """Search for what explains data that do not agree.
+    """Search for causes of the differences in data that do not agree.
 
-    Mistakes in columns and times come first; then another model, parameters, or faults at a time;
-    then scatter, or a factor of a channel. Data that start in another state are compared with other
-    models last, because the reason may be a mistake in one column. Only scenes of the catalogue
-    that have this start are tried before.
+    Mistakes in columns and times are tried first; then other models, other parameters and faults at
+    some times; then scatter, or a factor of a channel. If the data start in another state than the
+    scene, other models are tried last, because the reason may be a mistake in one column. Only
+    scenes of the catalogue with the initial state of the data are tried before.
 
     Parameters
     ----------
     search : the data and the reference.
-    judged : defects of the data, None where they are not known for all coordinates.
+    judged : defects of the data, None if they are unknown for some coordinate.
 
     Returns
     -------
     list of str
-        Causes in words; empty where nothing fits, or the data agree with the reference.
+        Causes in words; empty if nothing fits, or if the data agree with the reference.
     """
     first = search.up_to_horizon(search.data)
     is_elsewhere = True
@@ -70,17 +74,17 @@ def likely_causes(search: TrajectorySearch, judged: JudgedDefects | None) -> lis
 
 
 def _other_models_or_faults(search: TrajectorySearch, judged: JudgedDefects) -> list[str]:
-    """Search for other models, parameters and mistakes in the times, else for faults at a time."""
+    """Search for other models, parameters and a wrong clock; else for faults at some times."""
     texts = DefectSearch(judged, QUICK_SEARCH).explanations() + clock_mistakes(search)
     return texts or faults_in_time(judged)
 
 
 def _scatter(search: TrajectorySearch, data: ForeignData) -> list[str]:
-    """Find errors that are uncorrelated from row to row and do not grow.
+    """Return a text if the errors are scatter: uncorrelated from row to row, without growth.
 
     Parameters
     ----------
-    search : the reference, and the tolerance beyond which a channel is wrong.
+    search : the reference, and the tolerance above which a channel is wrong.
     data : rows of the data up to the horizon.
 
     Returns
@@ -97,12 +101,14 @@ def _scatter(search: TrajectorySearch, data: ForeignData) -> list[str]:
     sizes = (centred**2).mean(axis=0)
     if not is_wrong.any() or not ((sizes > 0.0) & (sizes < math.inf)).all():
         return []
-    # If only every second row is wrong, neighbours are uncorrelated: rows two apart count, too.
+    # If only every second row is wrong, neighbouring rows are uncorrelated. Therefore the
+    # correlation of rows two apart is computed, too.
     products = []
     for lag in (1, 2):
         products.append(np.abs((centred[lag:] * centred[:-lag]).mean(axis=0)))
     correlation = np.max(products, axis=0) / sizes
-    # Scatter is as large in the second half as in the first; an error of the motion grows.
+    # Scatter is as large in the second half of the rows as in the first; an error of the motion
+    # grows.
     half = len(data.time) // 2
     early = (centred[:half] ** 2).mean(axis=0)
     late = (centred[half:] ** 2).mean(axis=0)

@@ -1,4 +1,4 @@
-"""Integration methods of a constant step, whose own error may be the difference of data."""
+"""Define integration methods of constant step whose own error may explain a difference."""
 
 from __future__ import annotations
 
@@ -10,11 +10,13 @@ from rotor_mbs.models.lagrange.defects import runge_kutta_step
 from rotor_mbs.solution.trajectory import Array
 
 Derivative = Callable[[Array, Array], Array]
-# Called as step(derivative, t, y, h), returns y at t + h.
+# A function step(derivative, t, y, h) that returns y at t + h.
 Step = Callable[[Derivative, Array, Array, Array], Array]
 
-_ITERATIONS = 12  # of an implicit method: steps are short beside the motion
-_STEPS = (1, 2, 4, 5, 10, 20, 25, 50, 100)  # from row to row
+# Largest number of iterations in an implicit step. They converge fast, because a step is short
+# compared with the motion.
+_ITERATIONS = 12
+_STEPS = (1, 2, 4, 5, 10, 20, 25, 50, 100)  # numbers of steps from row to row that are tried
 
 
 def _euler(derivative: Derivative, time: Array, state: Array, h: Array) -> Array:
@@ -23,7 +25,7 @@ def _euler(derivative: Derivative, time: Array, state: Array, h: Array) -> Array
 
 
 def _semi_implicit_euler(derivative: Derivative, time: Array, state: Array, h: Array) -> Array:
-    """Return the state after an Euler step of the rates, then one of the angles by new rates."""
+    """Return the state after an Euler step of the rates, then of the angles with the new rates."""
     half = len(state) // 2
     rates = state[half:] + h * derivative(time, state)[half:]
     return np.concatenate([state[:half] + h * rates, rates])
@@ -56,16 +58,22 @@ def _trapezoidal(derivative: Derivative, time: Array, state: Array, h: Array) ->
 
 
 def _iterated(following: Callable[[Array], Array], end: Array) -> Array:
-    """Return what some iterations make of the state at the end of an implicit step."""
+    """Return the state at the end of an implicit step, by fixed-point iteration.
+
+    Parameters
+    ----------
+    following : function that computes the next iterate from the last one.
+    end : estimate of the state, from which the iteration begins.
+    """
     for _ in range(_ITERATIONS):
         before, end = end, following(end)
-        if np.array_equal(before, end):  # as all further ones would be
+        if np.array_equal(before, end):  # further iterations would change nothing
             break
     return end
 
 
 def _velocity_verlet(derivative: Derivative, time: Array, state: Array, h: Array) -> Array:
-    """Return the state after a step of Verlet's method, by the rates at half the step."""
+    """Return the state after a step of the velocity Verlet method, with rates at half the step."""
     half = len(state) // 2
     rates = state[half:] + 0.5 * h * derivative(time, state)[half:]
     angles = state[:half] + h * rates
@@ -73,7 +81,7 @@ def _velocity_verlet(derivative: Derivative, time: Array, state: Array, h: Array
     return np.concatenate([angles, rates + 0.5 * h * accelerations])
 
 
-# The method, and the largest number of its steps from row to row that is tried.
+# Step of each method, and the largest number of its steps from row to row that is tried.
 _METHODS: dict[str, tuple[Step, int]] = {
     "explicit Euler method": (_euler, 100),
     "semi-implicit Euler method": (_semi_implicit_euler, 100),
@@ -87,16 +95,17 @@ _METHODS: dict[str, tuple[Step, int]] = {
 
 
 def coarse_methods(interval: float) -> Iterator[tuple[str, Step, int]]:
-    """Yield methods with steps so long that they may be the cause of a difference.
+    """Yield methods with steps so long that their errors may cause a difference.
 
     Parameters
     ----------
-    interval : s, between two rows of the data.
+    interval : s, time between two rows of the data.
 
     Yields
     ------
     str, Step, int
-        The method and its step in words, the method, and the number of steps from row to row.
+        Name and step size of a method in words, its step function, and the number of steps from row
+        to row.
     """
     for name, (step, most) in _METHODS.items():
         for count in _STEPS:

@@ -1,10 +1,10 @@
-"""Hypotheses that may explain a difference, and the one search that tries them.
+"""Define hypotheses that may explain a difference, and the search that tries them.
 
-Every search for a cause has the same form, whatever the data are: columns of a trajectory, defects
-of intervals, loads, frequencies. There are candidates, each with a text, with what it changes in
-the data or the model, and with a price: the number of mistakes or parameters that it takes. There
-is a measure of what a change leaves of the difference. What leaves no more than is allowed explains
-it; of these the cheapest, or those that leave least, are named.
+All searches for causes have the same form: those in columns of a trajectory, in defects of
+intervals, in loads and in frequencies. A hypothesis has a text, a change of the data or the model,
+and a price, which is the number of mistakes or parameters that it assumes. A function measures how
+much of the difference a change leaves. A hypothesis explains the difference if its change leaves no
+more than is allowed. Then the cheapest explanations are named, or those that leave least.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ Change = TypeVar("Change")
 
 @dataclass(frozen=True)
 class Hypothesis(Generic[Change]):
-    """A possible cause of a difference.
+    """Hold a possible cause of a difference.
 
     Attributes
     ----------
-    text : the cause, in words; "" where nothing is wrong.
-    change : what it changes: another model, corrected data, another component of loads.
-    price : number of mistakes or parameters that it takes.
+    text : the cause, in words; "" if nothing is wrong.
+    change : another model, corrected data, or another component of loads.
+    price : number of mistakes or parameters that the hypothesis assumes.
     """
 
     text: str
@@ -35,7 +35,7 @@ class Hypothesis(Generic[Change]):
 
 @dataclass(frozen=True)
 class Explanation(Generic[Change]):
-    """A hypothesis that explains a difference, and what it leaves, by the measure of the search."""
+    """Hold a hypothesis that explains a difference, and how much of the difference it leaves."""
 
     hypothesis: Hypothesis[Change]
     left: float
@@ -55,14 +55,15 @@ def explanations(
 
     Parameters
     ----------
-    hypotheses : what is tried, in this order.
-    left : what a change leaves of the difference; NaN or infinite where it explains nothing.
-    allowed : what may be left.
+    hypotheses : the hypotheses, in the order in which they are tried.
+    left : function that returns how much of the difference a change leaves; NaN or infinite if the
+        change explains nothing.
+    allowed : how much an explanation may leave.
 
     Yields
     ------
     Explanation
-        As soon as it is found, so that a caller who wants the first one tries no more.
+        Each as soon as it is found: a caller who needs only the first one saves the other trials.
     """
     for hypothesis in hypotheses:
         size = left(hypothesis.change)
@@ -71,7 +72,7 @@ def explanations(
 
 
 def cheapest(explained: Iterable[Explanation[Change]]) -> list[Explanation[Change]]:
-    """Return the explanations of the lowest price, with the fewest mistakes or parameters."""
+    """Return the explanations with the fewest mistakes or parameters, those of the lowest price."""
     explained = list(explained)
     lowest = min((explanation.hypothesis.price for explanation in explained), default=0)
     return [explanation for explanation in explained if explanation.hypothesis.price == lowest]
@@ -85,8 +86,9 @@ def closest(
     Parameters
     ----------
     explained : explanations in any order.
-    factor : by which what an explanation leaves may exceed what the best one leaves.
-    least : what a right explanation may leave; smaller differences are not distinguished.
+    factor : explanations that leave up to this many times as much as the best one are returned.
+    least : how much a right explanation may leave; if the best one leaves less, `factor` multiplies
+        this number instead.
     """
     ordered = sorted(explained, key=lambda explanation: explanation.left)
     best = ordered[0].left if ordered else 0.0

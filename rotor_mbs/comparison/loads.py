@@ -36,8 +36,8 @@ _LOAD_ROUNDING = 16.0 * 2.0**-53
 _STATE_STEP = 1e-7  # relative step of an angle or rate, for the derivative of the loads
 _FEW_ROWS = 50  # largest number of rows in which another scene is tried first, to save time
 MIN_EXPLAINED = 5  # least number of rows for a search; with fewer, some cause always fits
-# A mistake is named as a cause if it leaves at most MAX_LEFT of the largest load or, for modes, of a
-# frequency, and at most LEFT_SHARE of the difference. The rest is the other program's own error.
+# A mistake is named as a cause if it leaves at most MAX_LEFT of the largest load (modes: of a
+# frequency) and at most LEFT_SHARE of the difference. The rest is the other program's own error.
 MAX_LEFT = 1e-4
 LEFT_SHARE = 1e-2
 WHOLE = LoadParts()

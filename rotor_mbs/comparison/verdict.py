@@ -19,31 +19,34 @@ from rotor_mbs.scenario.scene import Scene, scene_hash
 from rotor_mbs.solution.defects import Defects
 from rotor_mbs.solution.trajectory import Array
 
-LEVELS = (1e-3, 1e-6, 1e-9)  # rad, rad/s or relative, see `agrees_until`
-# rad, of an interval's defect; relative to a load's largest magnitude, or to a frequency
+LEVELS = (1e-3, 1e-6, 1e-9)  # levels of error in rad, rad/s or relative, see `agrees_until`
+# Largest allowed defect of an interval, rad; also the largest allowed error of a load relative to
+# its largest magnitude, and of a frequency relative to the frequency.
 DEFAULT_TOLERANCE = 1e-6
-# Limits of the names of unused columns in a file: their number, and their length as JSON; an
-# attribute of HDF5 has at most 64 kB.
+# Largest number of names of unused columns in a file, and largest length of all of them as JSON.
+# They are stored in an attribute, which has at most 64 kB in HDF5.
 _MAX_NAMES, _MAX_NAME_BYTES = 100, 30_000
 
 
 @dataclass(frozen=True)
 class ChannelErrors:
-    """Errors of a channel of data, such as "pitch 1" in "rad".
+    """Hold the errors of a channel of data, such as "pitch 1" in "rad".
 
-    Angles and rates are compared with the reference, loads with those of the closed form at the
-    states of the data, frequencies with those of the closed form.
+    Angles and rates are compared with the reference. Loads are compared with those of the closed
+    form at the states of the data, and frequencies with those of the closed form.
 
     Attributes
     ----------
-    error_max, error_whole : the largest error up to the horizon, and over all rows.
-    defect : the judged error, less what the rounding of the data explains; None if it is unknown.
-        For an angle or a rate (times the interval) it is the largest defect of an interval, rad,
-        each divided by its interval's `bound_factors` (see `solution.defects`); for a load the
-        largest error relative to the load's largest magnitude; for a frequency the largest relative
-        error.
-    floor : the largest such error that rounding explains.
-    agrees_until : see the function of this name.
+    error_max, error_whole : the largest error up to the horizon, and over all rows. For loads and
+        frequencies, which have no horizon, both are the same.
+    defect : the number that is compared with the tolerance, beyond rounding; None if unknown.
+        Angle: the largest defect of an interval in rad, after the defect of each interval is
+        divided by its `bound_factors` (see `solution.defects`). Rate: the same, with the defects
+        converted to rad by `Defects.rate_units`. Load: the largest error relative to the load's
+        largest magnitude. Frequency: the largest relative error.
+    floor : the largest defect or relative error that rounding can cause.
+    agrees_until : see the function `agrees_until`.
+    defect_unit : unit of `defect` and `floor`, or what they are relative to, in words.
     """
 
     name: str
@@ -58,24 +61,23 @@ class ChannelErrors:
 
 @dataclass(frozen=True)
 class DataVerdict:
-    """Result of a comparison.
+    """Hold the result of a comparison.
 
     Attributes
     ----------
     source : name of the file.
-    status, message : as of a run: "ok", or another one and why in a line.
-    tolerance : on the channels' `defect`, in its unit.
-    rows, compared_until, horizon_s : number of rows compared; time of the last one, s; horizon of
-        the scene, s, None for modes.
-    defect_time : s, end of the interval of the largest defect; None if it is unknown.
-    predicted : rad, the largest error up to the horizon to which the defects add up; None if it is
-        unknown.
+    status, message : "ok" or another status of a run; one line on why it is not "ok".
+    tolerance : largest allowed `defect` of a channel, in the unit of `defect`.
+    rows, compared_until, horizon_s : number of rows that are compared; time of the last of these
+        rows, s; horizon of the scene, s, None for modes.
+    defect_time : s, end of the interval with the largest defect; None if it is unknown.
+    predicted : rad, the largest error of an angle up to the horizon that the defects predict; None
+        if it is unknown.
     read : how columns were read, a line each.
-    unused : by name of every other column, why it is not compared.
+    unused : for the name of each column that is not used, the reason.
     notes : what else a user should know.
-    likely : likely causes of the difference, in words; empty if none was found or none was searched
-        for.
-    axis : "time", or "speed" of a table of modes, whose `compared_until` is in rad/s.
+    likely : likely causes of the difference, in words; empty if none is found or searched for.
+    axis : "time"; for a table of modes "speed", and then `compared_until` is a speed in rad/s.
     """
 
     scene: str
@@ -102,7 +104,7 @@ class DataVerdict:
 
 
 def agrees_until(rows: Array, error: Array) -> dict[str, float | None]:
-    """Find up to which row data agree with the reference, for each of `LEVELS`.
+    """Return the time or speed up to which data agree with the reference, for each of `LEVELS`.
 
     Parameters
     ----------
@@ -112,7 +114,8 @@ def agrees_until(rows: Array, error: Array) -> dict[str, float | None]:
     Returns
     -------
     dict
-        By level, as text, the last row before the error is larger; None where the first is.
+        For each level (as text) the time or speed of the last row before an error exceeds it; None
+        if the error of the first row does.
     """
     until: dict[str, float | None] = {}
     for level in LEVELS:
@@ -128,7 +131,7 @@ def as_dictionary(verdict: DataVerdict) -> dict[str, Any]:
 
 
 def from_dictionary(stored: Mapping[str, Any]) -> DataVerdict:
-    """Return a verdict from what `as_dictionary` returned, also after it was written as JSON."""
+    """Return the verdict in a dictionary of `as_dictionary`, which may have been stored as JSON."""
     values: dict[str, Any] = {}
     for name, value in stored.items():
         values[name] = tuple(value) if isinstance(value, list) else value
@@ -140,18 +143,18 @@ def from_dictionary(stored: Mapping[str, Any]) -> DataVerdict:
 def defects_of_channel(
     scene: Scene, defects: Defects | None, channel: Channel
 ) -> tuple[Array, Array] | None:
-    """Return a channel's interval defects, and how large rounding may make them.
+    """Return the magnitudes of a channel's interval defects, and the largest that rounding causes.
 
     Parameters
     ----------
     scene : the rotor, with the number of its coordinates.
-    defects : of the data, None where they are not known.
+    defects : interval defects of the data, None if they are unknown.
     channel : an angle or a rate.
 
     Returns
     -------
     tuple of ndarray, or None
-        Both (n - 1,) rad; None where the channel's coordinate has no defects.
+        Both (n - 1,) rad; None if the defects are unknown, or if the coordinate does not move.
     """
     count = len(scene.initial_angles)
     coordinate, is_rate = channel.column % count, channel.column >= count
@@ -177,14 +180,14 @@ def comparison_record(
     verdict : the verdict, stored as JSON in an attribute.
     scene : the scene, stored as text.
     data : the rows that were compared.
-    expected : (n, channels) what they should be.
-    defects : interval defects of the data, None where unknown.
+    expected : (n, channels) right numbers, of the reference or the closed form.
+    defects : interval defects of the data, None if they are unknown.
 
     Returns
     -------
     Record
-        For each channel its data and the columns `_reference`, `_error`, and of an angle or a rate
-        `_defect`, NaN where there is none.
+        For each channel a column of its data, and columns whose names end with `_reference`,
+        `_error` and, for an angle or a rate, `_defect`. A defect that is unknown is NaN.
     """
     axis, content = verdict.axis, "modes" if data.is_modes else "trajectory"
     if data.is_modes:
@@ -200,7 +203,7 @@ def comparison_record(
             "_error": (channel.unit, ", data minus reference", values - right),
         }
         if not channel.is_load and not data.is_modes:
-            # A row has the defect of the interval that ends there; NaN where there is none.
+            # A row has the defect of the interval that ends at this row; NaN if it is unknown.
             defect = np.full(len(values), np.nan)
             known = defects_of_channel(scene, defects, channel)
             if known is not None:
@@ -233,7 +236,7 @@ def unused_lines(verdict: DataVerdict, most: int = 12) -> list[str]:
 
     Parameters
     ----------
-    verdict : with the unused columns and the reasons.
+    verdict : the verdict, with the unused columns and the reasons.
     most : how many names a line lists.
     """
     names_by_reason: dict[str, list[str]] = {}
@@ -249,11 +252,11 @@ def unused_lines(verdict: DataVerdict, most: int = 12) -> list[str]:
 
 
 def channel_table(verdict: DataVerdict) -> TextTable:
-    """Return a table with a row per channel: largest error and defect, ends of agreement.
+    """Return a table with a row for each channel: largest error, largest defect, `agrees_until`.
 
     Parameters
     ----------
-    verdict : with the errors by channel.
+    verdict : the verdict, with the errors of each channel.
     """
     head = (
         "channel",
@@ -271,15 +274,15 @@ def channel_table(verdict: DataVerdict) -> TextTable:
 
 
 def axis_unit(verdict: DataVerdict) -> str:
-    """Return the unit of the times, or of the speeds of a table of modes."""
+    """Return the unit of the rows' times, or of the rows' speeds in a table of modes."""
     return "s" if verdict.axis == "time" else "rad/s"
 
 
 def verdict_of(record: Record) -> DataVerdict:
-    """Return the verdict that a stored comparison has."""
+    """Return the verdict in the record of a stored comparison."""
     return from_dictionary(json.loads(record.attributes["verdict"]))
 
 
 def _defect(channel: ChannelErrors) -> str:
-    """Return the largest defect of a channel with its unit; "" where there is none."""
+    """Return the largest defect of a channel with its unit; "" if it is unknown."""
     return "" if channel.defect is None else f"{channel.defect:.1e} {channel.defect_unit}"

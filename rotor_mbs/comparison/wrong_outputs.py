@@ -1,7 +1,8 @@
-"""Rows, tips, energies and loads that a program computes wrongly from a right motion.
+"""Find the mistakes with which a method computes wrong rows, tips, energies or loads.
 
-Each is compared with what other conventions or numbers make of the same states. One of these is
-named if it leaves at most a thousandth of the difference; for loads and tips only if no other does.
+Each output is compared with the results of common mistakes at the same states. A mistake is named
+if it leaves at most a thousandth of the difference; a mistake in tips only if no other mistake
+does. For mistakes in loads the rules of `comparison.loads` hold.
 """
 
 from __future__ import annotations
@@ -24,9 +25,10 @@ from rotor_mbs.solution.defects import Defects
 from rotor_mbs.solution.quantities import LOADS
 from rotor_mbs.solution.trajectory import Array, Trajectory
 
-_LEFT = 1e-3  # of a difference, by what is named
-_STRAIGHT = 0.3  # of the rows: more than this lie on straight lines where rows are interpolated
-_MAX_ALIKE = 3  # explanations of an energy that are named
+_LEFT = 1e-3  # largest share of a difference that a named mistake may leave
+_STRAIGHT = 0.3  # share of rows on straight lines, above which rows are taken to be interpolated
+# Largest number of mistakes in an energy that are named, and of blades with a wrong tip.
+_MAX_ALIKE = 3
 
 
 # Rows
@@ -82,7 +84,7 @@ def root_mean_square(defects: Defects) -> float:
 
 
 def _interpolated_rows(run: Trajectory, defects: Defects) -> str:
-    """Return a text if many rows lie on straight lines between their neighbours; else "".
+    """Return a text if linear interpolation explains that many rows are wrong; else "".
 
     Parameters
     ----------
@@ -96,8 +98,8 @@ def _interpolated_rows(run: Trajectory, defects: Defects) -> str:
     bend = np.abs(angles[2:] - 2.0 * angles[1:-1] + angles[:-2])
     is_straight = (bend <= 1e-12 * size).all(axis=1) & np.ptp(angles, axis=0).any()
     share = float(is_straight.mean())
-    # A uniform rotation is a straight line, too; but it has no defects, and it does not alternate
-    # again and again with rows off the line.
+    # A uniform rotation is a straight line, too. But it has no defects, and rows on the line do not
+    # alternate with rows off the line.
     changes = np.count_nonzero(np.diff(is_straight.astype(int)))
     if share <= _STRAIGHT or changes < 4:
         return ""
@@ -123,7 +125,7 @@ def _differenced_rates(run: Trajectory) -> str:
         "central": (run.rates[1:-1], 0.5 * (slopes[1:] + slopes[:-1])),
     }
     size = max(float(np.abs(run.rates).max()), float(np.finfo(float).tiny))
-    # Of a uniform rotation the quotients are the rates, however these were computed.
+    # In a uniform rotation the quotients equal the rates, however the rates were computed.
     is_uniform = np.ptp(run.rates, axis=0).max() <= 1e-9 * size
     for text, (rates, quotient) in quotients.items():
         if not is_uniform and np.abs(rates - quotient).max() <= 1e-9 * size:
@@ -153,7 +155,7 @@ def wrong_tip(scene: Scene, run: Trajectory) -> str:
 
 
 def _other_tips(scene: Scene, angles: Array, own: Array) -> Iterator[tuple[str, Array]]:
-    """Yield wrong tip paths, each with its mistake in words before it.
+    """Yield mistakes in words, each with the wrong tip paths that it gives.
 
     Parameters
     ----------
@@ -164,7 +166,7 @@ def _other_tips(scene: Scene, angles: Array, own: Array) -> Iterator[tuple[str, 
     Yields
     ------
     str, ndarray
-        The mistake; (n, blades, 3) m.
+        The mistake in words; the tip paths, (n, blades, 3) m.
     """
     pitches = np.array([0.0, *[1.0] * len(scene.blades)])
     factors = {
@@ -192,7 +194,7 @@ def _other_tips(scene: Scene, angles: Array, own: Array) -> Iterator[tuple[str, 
 
 
 def _leaning_otherwise(scene: Scene) -> Iterator[tuple[str, Scene]]:
-    """Yield those of `other_scenes` that have another tilt or cone, and the mistake in words."""
+    """Yield the mistakes and scenes of `other_scenes` in which tilt or cones are different."""
     cones = [blade.cone for blade in scene.blades]
     for text, other in other_scenes(scene):
         if other.shaft_tilt != scene.shaft_tilt or [blade.cone for blade in other.blades] != cones:
@@ -200,12 +202,12 @@ def _leaning_otherwise(scene: Scene) -> Iterator[tuple[str, Scene]]:
 
 
 def _other_tip_points(scene: Scene, tip: Array, angles: Array, own: Array) -> str:
-    """Return by how much the tips are off, if that is constant in some frame; "" if not.
+    """Return the offset of the tips in words, if it is constant in some frame; "" if not.
 
     Parameters
     ----------
     scene : the rotor.
-    tip, own : (n, blades, 3) m, paths of the run, and the right ones.
+    tip, own : (n, blades, 3) m, paths of the run, and the right paths.
     angles : (n, 1 + blades) rad, rotor first.
     """
     allowed = _LEFT * float(np.abs(tip - own).max())
@@ -232,7 +234,7 @@ def _other_tip_points(scene: Scene, tip: Array, angles: Array, own: Array) -> st
 
 
 def _blade_frames(scene: Scene, angles: Array) -> Array:
-    """Return the axes of the blades' frames in the base, (n, blades, 3, 3): columns."""
+    """Return the axes of the blades' frames in the base frame, as columns of (n, blades, 3, 3)."""
     columns = []
     for axis in np.eye(3):
         point = (float(axis[0]), float(axis[1]), float(axis[2]))
@@ -251,12 +253,12 @@ def wrong_energy(scene: Scene, run: Trajectory, name: str) -> str:
     ----------
     scene : the rotor.
     run : samples of the run, with this energy.
-    name : "kinetic energy" or "potential energy"; of others no mistake is known.
+    name : "kinetic energy" or "potential energy"; for other names no mistake is searched for.
 
     Returns
     -------
     str
-        All mistakes that explain it, in words, if these are at most three; else "".
+        All mistakes that explain the energy, in words; "" if there are none or more than three.
     """
     if name == "kinetic energy":
         stored, own = run.kinetic_energy, kinematics.kinetic_energy(scene, run.angles, run.rates)
@@ -275,7 +277,7 @@ def wrong_energy(scene: Scene, run: Trajectory, name: str) -> str:
 def _other_kinetic_energies(
     scene: Scene, run: Trajectory, own: Array
 ) -> Iterator[tuple[str, Array]]:
-    """Yield wrong kinetic energies, (n,) J, each with its mistake in words before it.
+    """Yield mistakes in words, each with the wrong kinetic energy that it gives, (n,) J.
 
     Parameters
     ----------
@@ -295,7 +297,7 @@ def _other_kinetic_energies(
 def _other_potential_energies(
     scene: Scene, run: Trajectory, own: Array
 ) -> Iterator[tuple[str, Array]]:
-    """Yield wrong potential energies, (n,) J, each with its mistake in words before it.
+    """Yield mistakes in words, each with the wrong potential energy that it gives, (n,) J.
 
     Parameters
     ----------
@@ -319,7 +321,7 @@ def _other_potential_energies(
 
 
 def _scaled(own: Array) -> Iterator[tuple[str, Array]]:
-    """Yield an energy times several factors, each with its factor in words before it."""
+    """Yield wrong factors in words, each with an energy times this factor."""
     for text, factor in (("opposite sign", -1.0), ("half of it", 0.5), ("twice of it", 2.0)):
         yield text, factor * own
 
@@ -338,7 +340,7 @@ def wrong_loads(scene: Scene, run: Trajectory) -> str:
     Parameters
     ----------
     scene : the rotor.
-    run : samples of the run; of the loads those that it has are examined.
+    run : samples of the run, with the loads that are examined.
     """
     defects = defects_of(scene, run)
     by_load = {load.name: run.get(load.name) for load in LOADS}
@@ -357,11 +359,11 @@ def wrong_loads(scene: Scene, run: Trajectory) -> str:
     return "; ".join(compare_loads(scene, data, defects, DEFAULT_TOLERANCE).likely)
 
 
-# All of them
+# Functions for several outputs
 
 
 def _explaining(stored: Array, own: Array, trials: Mapping[str, Array]) -> list[str]:
-    """Return the trials that leave at most a thousandth of the difference between two arrays."""
+    """Return the names of the trials that leave at most a thousandth of `stored` minus `own`."""
     difference = float(np.abs(stored - own).max(initial=0.0))
     named = []
     for text, values in trials.items():
@@ -371,7 +373,7 @@ def _explaining(stored: Array, own: Array, trials: Mapping[str, Array]) -> list[
 
 
 def _exchanges(count: int) -> Iterator[tuple[NDArray[np.intp], str]]:
-    """Yield wrong orders of the blades, and the mistake in words after each.
+    """Yield wrong orders of the blades, each with its mistake in words.
 
     Parameters
     ----------
@@ -380,7 +382,7 @@ def _exchanges(count: int) -> Iterator[tuple[NDArray[np.intp], str]]:
     Yields
     ------
     ndarray, str
-        (count,) numbers of the blades whose values stand at each blade.
+        For each blade the index of the blade whose values it has, (count,); the mistake in words.
     """
     blades = np.arange(count)
     orders = {
@@ -389,7 +391,7 @@ def _exchanges(count: int) -> Iterator[tuple[NDArray[np.intp], str]]:
         "of the next blade for each blade": np.roll(blades, -1),
         "of the previous blade for each blade": np.roll(blades, 1),
     }
-    # Of one or two blades several of these are the same, or the right order.
+    # With one or two blades several of these orders are equal to each other or to the right order.
     seen = [blades.tolist()]
     for text, order in orders.items():
         if order.tolist() not in seen:
@@ -398,13 +400,13 @@ def _exchanges(count: int) -> Iterator[tuple[NDArray[np.intp], str]]:
 
 
 def _with_tips_at_centres(scene: Scene) -> Scene:
-    """Return a scene whose tip paths are those of the centres of mass."""
+    """Return a scene in which the tip of each blade is its centre of mass."""
     blades = tuple(replace(blade, tip=blade.centre_of_mass) for blade in scene.blades)
     return replace(scene, blades=blades)
 
 
 def _turned_about_shaft(scene: Scene, paths: Array, angles: Array) -> Array:
-    """Turn (n, blades, 3) vectors in the base about the shaft, by (blades,) rad."""
+    """Return vectors of the base frame, (n, blades, 3), turned about the shaft by (blades,) rad."""
     s, c = np.sin(angles)[:, None], np.cos(angles)[:, None]
     axis = shaft_direction(scene, "")
     # Rodrigues' formula.
