@@ -1,6 +1,6 @@
-"""Compare loads of another program with those of the closed form at the same states.
+"""Compare loads of another program with the closed form's loads, and find causes of differences.
 
-It also searches for the causes of differences.
+The loads of the closed form are computed at the states of the data.
 """
 
 from __future__ import annotations
@@ -41,6 +41,7 @@ MIN_EXPLAINED = 5  # least number of rows for a search; with fewer, some cause a
 MAX_LEFT = 1e-4
 LEFT_SHARE = 1e-2
 WHOLE = LoadParts()
+# Mistakes in the terms that loads consist of, and the factors of the terms.
 _FORGOTTEN = {
     "without the weight": LoadParts(weight=0.0),
     "with twice the weight": LoadParts(weight=2.0),
@@ -52,7 +53,7 @@ _FORGOTTEN = {
     "without the dampers of the bearings": LoadParts(dampers=0.0),
     "without the pitch torques": LoadParts(torques=0.0),
 }
-# Mistakes in the unit of a column, by the factor between the column and the right numbers.
+# Mistakes in the unit of a column, by the factor from the right numbers to those of the column.
 _UNITS = {1.0: "", 1e-3: "kN taken as N", 1e3: "N taken as kN"}
 _FACTORS = [sign * factor for sign in (1.0, -1.0) for factor in _UNITS]
 # "" is the frame of the scene's own loads: for loads on a root the blade's frame, for loads on the
@@ -139,14 +140,14 @@ class JudgedLoads:
         return distinct_frames(self.scene)
 
     def scale(self, j: int, component: Array) -> float:
-        """Return the size that errors of channel j are divided by if it is `component`, (n,)."""
+        """Return the divisor of the errors of channel j if the channel is `component`, (n,)."""
         largest = float(np.abs(component).max(initial=0.0))
         return max(largest, float(self.smallest_scale[j])) or 1.0
 
     def left(self, j: int, component: Component, *, may_vanish: bool = False) -> float:
-        """Return by how much the error of a channel exceeds the allowed one if it is `component`.
+        """Return the largest error of a channel, taken as `component`, minus the allowed error.
 
-        The channel may be this component if the result is at most 0.
+        The component explains the channel if the result is at most 0.
 
         Parameters
         ----------
@@ -448,7 +449,8 @@ def _explained(loads: JudgedLoads, wrong: Sequence[int]) -> tuple[str, ...]:
     for j in of_hub:
         wrong.remove(j)
     by_channel: dict[int, list[Explanation[Component]]] = {}
-    unexplained: dict[tuple[str, str], list[int]] = {}  # moments by load and frame
+    # Numbers of the channels of moments that no component explains, by load and frame.
+    unexplained: dict[tuple[str, str], list[int]] = {}
     for j in wrong:
         candidates = _component_hypotheses(loads, j)
         explained = cheapest(
@@ -558,7 +560,7 @@ def _other_hub_mass(loads: JudgedLoads, wrong: Sequence[int]) -> dict[int, str]:
     -------
     dict
         For the number of each wrong channel of the shaft's force, the cause in words. Empty if no
-        mass explains all of these channels, or if a mass of zero does.
+        mass explains all of these channels, or if the fitted mass is about zero or negative.
     """
     scene = loads.scene
     forces = [j for j in wrong if _load(loads.channels[j]) == "shaft force"]
@@ -676,7 +678,7 @@ def _shared_names(loads: JudgedLoads, names: Sequence[str]) -> list[str]:
 
 
 def _shared_exchanges(loads: JudgedLoads, exchanged: Sequence[str]) -> list[str]:
-    """Return texts on exchanged columns; one on a load replaces those on all its components.
+    """Return texts on exchanged columns; a text on a load replaces those on all its components.
 
     Parameters
     ----------

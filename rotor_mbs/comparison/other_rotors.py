@@ -1,4 +1,4 @@
-"""Yield candidates for the cause of a difference: other scenes, equations and parameters."""
+"""Define candidates for the cause of a difference: other scenes, equations and parameters."""
 
 from __future__ import annotations
 
@@ -82,6 +82,7 @@ _UNITS = {
     ),
 }
 _POUND = 0.45359237  # kg in a pound
+# Prescribed loads of a scene, and their names in words.
 _LOADS = {
     "rotor_torque": "torque of the rotor",
     "pitch_torque": "pitch torques",
@@ -90,8 +91,8 @@ _LOADS = {
 _CYCLES = (2, 5, 10, 20, 50)  # numbers of rows over which a controller may hold its loads
 # Numbers of rows by which loads may be late.
 _DELAYS = (1, 2, 3, 4, 5, 8, 10, 15, 20, 25, 30, 40, 50, 75, 100)
-# Sets of the paper's errata that have different effects. E3 is never without E2: it is the power of
-# a term that is zero without E2.
+# Sets of the paper's errata with different effects. E3 is tried only together with E2: the term
+# whose power it changes is zero without E2.
 _ERRATA = ("E1", "E2", "E1 and E2", "E2 and E3", "E1 and E2 and E3")
 
 # The way from a scene to one of its numbers: names of fields and indices of entries.
@@ -106,7 +107,7 @@ class RotorModel:
     ----------
     scene : the rotor.
     azimuths : (blades,) rad, azimuths of the blades; None for `Scene.phases`.
-    equations : function for the accelerations; None for that of the closed form.
+    equations : function for the accelerations; None for the closed form's.
     method, steps : step of an integration method with an error of its own, None for an exact
         integration; number of its steps from row to row.
     """
@@ -278,19 +279,19 @@ def _with_reactions(torques: float, springs: float, dampers: float) -> Accelerat
 
 
 def _quadratic_dampers(_angles: Any, rates: Any, form: Any, _loads: Any) -> Any:
-    """Return the additional moments with which bearing dampers are quadratic in the rate, N m."""
+    """Return the additional moments, N m, for bearing dampers quadratic in the rate in rad/s."""
     pairs = zip(form.blades, rates[1:], strict=True)
     return 0.0, [blade.damping * rate * (1.0 - np.abs(rate)) for blade, rate in pairs]
 
 
 def _quadratic_shaft_damper(_angles: Any, rates: Any, form: Any, _loads: Any) -> Any:
-    """Return the additional moment with which the shaft's damper is quadratic in the rate, N m."""
+    """Return the additional moment, N m, for a shaft damper quadratic in the rate in rad/s."""
     moment = form.shaft_damping * rates[0] * (1.0 - np.abs(rates[0]))
     return moment, [0.0] * len(form.blades)
 
 
 def _sine_springs(angles: Any, rates: Any, form: Any, loads: Any) -> Any:
-    """Return the additional moments with which springs act by the sine of the deflection, N m."""
+    """Return the additional moments, N m, for springs that act by the sine of the deflection."""
     moments = []
     for blade, theta, _, _, rest in closed_form.pitches(form, angles, rates, loads):
         deflection = theta - rest
@@ -383,7 +384,7 @@ class _MassMatrix:
         return moments
 
     def solve(self, moments: Sequence[Any]) -> list[Any]:
-        """Return the accelerations, rad/s², that given moments cause, N m."""
+        """Return the accelerations, rad/s², that moments, N m, cause."""
         reduced, (moment, *others) = self.inertia, moments
         for inertia, coupling, other in zip(self._pitches, self.couplings, others, strict=True):
             reduced = reduced - coupling * coupling / inertia
@@ -618,7 +619,7 @@ def _with_tables(scene: Scene, change: Callable[[LoadTable], LoadTable]) -> Scen
 
 
 def _with_damped_error(scene: Scene) -> Scene:
-    """Return a scene whose dampers act on the rate of the pitch less that of the rest angle.
+    """Return a scene whose bearing dampers act on the pitch rate minus the rest angle's rate.
 
     Parameters
     ----------

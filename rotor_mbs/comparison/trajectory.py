@@ -56,7 +56,7 @@ from rotor_mbs.solution.trajectory import Array, Trajectory
 # Times are rounded: a time that exceeds the duration by at most this share of it is inside.
 _TIME_ROUNDING = 1e-9
 _MIN_ROWS = 3  # fewer rows are too few to be compared
-_STAGES = 4  # reference, interval defects, search for causes, loads
+_STAGES = 4  # number of stages: reference, interval defects, search for causes, loads
 _SAME_START = 1e-3  # rad, rad/s: data whose first row differs by more have another initial state
 # If all errors are within the tolerance, a cause may leave at most this share of the largest one.
 _LEFT_OF_SMALL_ERRORS = 0.02
@@ -118,7 +118,7 @@ class TrajectoryErrors:
     predicted, defect_time : see `DataVerdict`.
     drift : rad, the largest sum of defects over 10 or 100 rows (`STRETCHES`), beyond rounding.
     drifting : channel and number of rows of `drift`, in words.
-    beyond_digits : the largest ratio of a defect, or of a sum of defects over `STRETCHES`, to what
+    beyond_digits : the largest ratio of a defect, or of a sum of defects as in `drift`, to what
         rounding makes of it.
     missing : labels of the coordinates whose angles the data lack.
     """
@@ -136,7 +136,7 @@ class TrajectoryErrors:
 
 
 @caller_signals()
-@np.errstate(all="ignore")  # data may have so large numbers that the arithmetic overflows
+@np.errstate(all="ignore")  # the data may have numbers so large that arithmetic overflows
 def compare_with_reference(
     data: ForeignData,
     scene: Scene,
@@ -457,7 +457,7 @@ def _largest_interval(defects: Defects) -> int:
 
 
 class LargestSums(NamedTuple):
-    """Hold the largest sums of defects over `STRETCHES`, numbers of successive rows.
+    """Hold the largest sums of defects over 10 or 100 successive rows (`STRETCHES`).
 
     Attributes
     ----------
@@ -471,7 +471,7 @@ class LargestSums(NamedTuple):
 
 
 def _largest_sums(scene: Scene, defects: Defects | None) -> LargestSums:
-    """Find the largest sums of defects over `STRETCHES`, numbers of successive rows.
+    """Find the largest sums of defects over 10 or 100 successive rows (`STRETCHES`).
 
     The defects of a drift may be below the tolerance in each interval although their sum is above.
 
@@ -558,7 +558,7 @@ def _wrong_first_row(
 
 
 def _wrong_defects(tolerance: float, errors: TrajectoryErrors) -> Iterator[tuple[str, str]]:
-    """Yield a finding for each channel whose defect is too large, and for a drift that is.
+    """Yield a finding for each channel whose defect is too large, and for too large a drift.
 
     Parameters
     ----------
@@ -580,7 +580,7 @@ def _wrong_defects(tolerance: float, errors: TrajectoryErrors) -> Iterator[tuple
 def _wrong_errors(
     tolerance: float, rows: ReferencedRows, errors: TrajectoryErrors
 ) -> Iterator[tuple[str, str]]:
-    """Yield findings if errors up to the horizon are too large, per unit of growth or in size.
+    """Yield findings if errors up to the horizon are too large, per unit of growth or absolutely.
 
     Parameters
     ----------

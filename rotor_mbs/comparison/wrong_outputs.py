@@ -84,7 +84,7 @@ def root_mean_square(defects: Defects) -> float:
 
 
 def _interpolated_rows(run: Trajectory, defects: Defects) -> str:
-    """Return a text if linear interpolation explains that many rows are wrong; else "".
+    """Return a text if many rows are linearly interpolated between other rows; else "".
 
     Parameters
     ----------
