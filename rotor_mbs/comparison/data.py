@@ -214,9 +214,10 @@ def data_of_table(
         )
         of_steps = rounding_of_steps(time)
         time_rounding = rounding[0][places] if of_steps is None else of_steps
-        time_precision = _time_precision(
-            columns[0], rounding[0], is_equidistant=of_steps is not None
-        )
+        if of_steps is None:  # with equal intervals the digits of the times do not matter
+            channel, source = next(iter(sources.items()))
+            written = rounding[0] / _factor(channel, source)
+            time_precision = _time_precision(columns[0], written, source.unit)
     values = []
     for source, array in zip(list(sources.values())[1:], arrays[1:], strict=True):
         values.append(np.unwrap(array[places]) if source.wrapped else array[places])
@@ -438,19 +439,18 @@ def _precision(columns: Sequence[Array], rounding: Sequence[Array]) -> str:
     return f"{digits} digits{where}: relative rounding error {0.5 * 10.0 ** (1 - digits):.0e}"
 
 
-def _time_precision(time: Array, rounding: Array, *, is_equidistant: bool) -> str:
+def _time_precision(time: Array, rounding: Array, unit: str) -> str:
     """Return the precision of times in words, see `ForeignData.time_precision`.
 
     Parameters
     ----------
-    time : (n,) times as they were written, in the unit of the file.
-    rounding : (n,) their rounding, s.
-    is_equidistant : whether nearly all intervals are equal; then the digits of the times do not
-        matter.
+    time, rounding : (n,) times as they were written, and the rounding of each, in the unit of the
+        file.
+    unit : the unit of the file; it is added to a rounding error that is not in s.
     """
-    if is_equidistant:
-        return ""
     text = _precision([time], [rounding])
+    if "decimals" in text and unit not in ("", "s"):
+        return f"{text} {unit}"
     if text or not (rounding > 2.0 * 2.0**-53 * np.abs(time)).any():
         return text
     return f"{_significant_digits(time)} digits"

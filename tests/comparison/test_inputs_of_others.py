@@ -161,14 +161,15 @@ def rotor_late(path: Path, run: rm.Run) -> None:
     csv(path, by_name(run) | {"rotor": run.angles[[0, *range(100)], 0]})
 
 
-def solver_steps(path: Path, run: rm.Run) -> None:
-    """Rows of unequal steps, of which the times alone have three decimals."""
+def solver_steps(path: Path, run: rm.Run, name_of_time: str = "time") -> None:
+    """Rows of unequal steps, of which the times alone are rounded, to 1 ms."""
     fine = rm.run(SCENE.replace(samples=6001), "lagrange/dop853")
     rows = np.cumsum(np.random.default_rng(3).integers(40, 80, 150))
     rows = np.append(0, rows[rows < 6001])
     columns = {name: values[rows] for name, values in by_name(fine).items()}
     assert len(run.time) == 101
-    csv(path, columns | {"time": np.round(columns["time"], 3)})
+    times = np.round(columns.pop("time"), 3)
+    csv(path, {name_of_time: np.round(1e3 * times) if "ms" in name_of_time else times} | columns)
 
 
 @dataclass(frozen=True)
@@ -222,6 +223,11 @@ CASES = {
     "below zero": Case("a.csv", below_zero),
     "rotor a row late": Case("a.csv", rotor_late, "inaccurate", likely="rotor: a row late"),
     "steps of a solver": Case("a.csv", solver_steps, note="times of 3 decimals"),
+    "steps in ms": Case(
+        "a.csv",
+        lambda p, r: solver_steps(p, r, "time [ms]"),
+        note="times of 0 decimals: rounding error 5e-01 ms",
+    ),
 }
 # The four that were `ok` and wrong, and one of each further family.
 FAST = {
