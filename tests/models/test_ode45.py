@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from fractions import Fraction
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -135,6 +136,21 @@ STEPPED = {
     "errors below the threshold are absolute": (harmonic, 10.0, [5e-4, 0.0], 1e-8, 1e-11),
     "some steps fail": (van_der_pol, 20.0, [2.0, 0.0], 1e-4, 1e-7),
     "a slope that changes with time": (lambda t, _y: [math.cos(t)], 1.0, [0.0], 1e-8, 1e-11),
+    "a slope that changes with time and state": (
+        lambda t, y: [math.cos(5.0 * t) * y[0]],
+        2.0,
+        [1.0],
+        1e-8,
+        1e-11,
+    ),
+    # The longest step is a tenth of the span; the rule for the first one gives a 1.0005-th of it.
+    "a first step that is hardly shorter than the longest": (
+        wall(9.0, 1.0005 / 1.25),
+        1.0,
+        [1.0],
+        1e-5,
+        1e-8,
+    ),
     "steep": (lambda _t, y: [-20.0 * y[0]], 1.0, [1.0], 1e-5, 1e-8),
     "stretched": (wall(9.0, 0.1 / (1.25 * 0.09001 / 6.0)), 1.0, [1.0], 1e-5, 1e-8),
     "cut": (wall(9.0, 0.1 / (1.25 * 0.08999 / 6.0)), 1.0, [1.0], 1e-5, 1e-8),
@@ -156,11 +172,16 @@ STEPPED = {
 @pytest.mark.filterwarnings("ignore:invalid value:RuntimeWarning")
 @pytest.mark.parametrize("case", STEPPED)
 def test_steps_are_those_of_matlabs_rules(case):
-    result, expected = ode45(*STEPPED[case]), steps_of_matlab(*STEPPED[case])
+    f, *others = STEPPED[case]
+    counted = Mock(side_effect=f)
+    result, expected = ode45(counted, *others), steps_of_matlab(f, *others)
     np.testing.assert_allclose(result.time, expected, rtol=1e-12)
-    assert result.success == (expected[-1] == STEPPED[case][1])
-    assert result.success or result.message.startswith(
-        f"Failure at t={expected[-1]:e}. Unable to meet"
+    assert result.evaluations == counted.call_count
+    assert result.success == (expected[-1] == others[0])
+    assert result.success or result.message == (
+        f"Failure at t={expected[-1]:e}. Unable to meet integration tolerances without reducing "
+        f"the step size below the smallest value allowed ({16.0 * np.spacing(expected[-1]):e}) at "
+        "time t."
     )
 
 
