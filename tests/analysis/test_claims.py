@@ -72,7 +72,13 @@ def test_what_the_file_cannot_decide_is_left_out(tmp_path: Path) -> None:
             == []
         )
         words, one = claims(results.scenes, [claim(known), number(1.0)])
+        unknown_metric = replace(number(1.0), metric="not there")
+        assert claims(results.scenes, [unknown_metric]) == []
     assert (words.printed, one.printed, one.corrected) == (None, pytest.approx(1.0), None)
+    right = [Made(FIG11, REFERENCE, rotor(lambda t: 0.2 * t))]
+    with open_results(store(tmp_path / "right.h5", right)) as results:
+        (one,) = claims(results.scenes, [number(1.0)])
+    assert (one.printed, one.corrected) == (None, pytest.approx(2.0))
 
 
 def test_the_reference_stands_for_right_and_without_it_the_closed_form(tmp_path: Path) -> None:

@@ -140,6 +140,27 @@ def test_a_reference_has_loads_where_they_are_asked_for() -> None:
     np.testing.assert_allclose(result.quantities["blade_root_force"], expected, rtol=1e-12)
 
 
+def test_loads_of_a_reference_have_the_rounding_of_quad_precision() -> None:
+    """A point mass on a massless rod bears no force across it: 1e-13 of the weight in doubles."""
+    pytest.importorskip("heyoka")
+    mass = replace(AXIAL, inertia=(0.0,) * 6)
+    scene = make_scene([1.0, 0.0], [0.5, 0.0], (mass,), duration=0.5, samples=11)
+    run = solve("reference", replace(scene, outputs=("angles", "rates", "loads")), {}).trajectory
+    across = run.quantities["blade_root_force"][:, 0, 0]
+    assert np.abs(across).max() < 1e-25 * mass.mass * scene.gravity
+
+
+def test_the_growth_of_a_run_of_two_samples_is_that_at_its_end() -> None:
+    pytest.importorskip("heyoka")
+    ends = []
+    for samples in (2, 5):
+        scene = paper("fig03", duration=2.0, samples=samples)
+        ends.append(solve("reference", scene, {}).trajectory.error_growth[-1])
+    assert ends[0] > 1.2
+    # The matrix is good to its tolerance however the way to it is divided.
+    assert ends[0] == pytest.approx(ends[1], rel=1e-9)
+
+
 @pytest.mark.parametrize("is_available", [True, False])
 @pytest.mark.parametrize(("shorter", "rows"), [(0, 1), (1, 3)])
 def test_a_reference_of_which_one_run_ends_early(

@@ -15,6 +15,7 @@ from support.scenes import ARM, MASS, OFFSET, paper
 
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.methods.solve import solve
+from rotor_mbs.models.lagrange import ode_solvers
 from rotor_mbs.models.lagrange.closed_form import load_values
 from rotor_mbs.models.lagrange.heyoka_adapter import array_of
 from rotor_mbs.models.lagrange.ode_solvers import (
@@ -124,6 +125,70 @@ def test_a_state_that_has_diverged_has_no_derivative() -> None:
     values = solver.right_hand_side(segment)(0.0, [math.inf, 0.0, 1.0, 0.0])
     assert len(values) == 4
     assert np.isnan(values).all()
+
+
+def test_a_derivative_that_is_not_finite_ends_a_run_at_its_start_alone() -> None:
+    """A trial step may go where there is none: the solver shortens it."""
+    at_start = INTEGRATORS["DOP853"](
+        lambda _t, _y: [math.nan], 0.0, 1.0, np.ones(1), np.array([0.5])
+    )
+    assert at_start.message == "SciPy: the derivative of the state is not finite"
+    assert (at_start.steps, at_start.evaluations, len(at_start.states)) == (0, 0, 0)
+    assert at_start.end.tolist() == [1.0]
+    # The slope is not defined beyond 1, and the first trial steps are 100 times as long.
+    tried = []
+
+    def bounded(time: float, _state: Any) -> list[float]:
+        tried.append(time)
+        return [1.0 if time <= 1.0 else math.nan]
+
+    later = INTEGRATORS["DOP853"](bounded, 0.0, 100.0, np.ones(1), np.array([0.5]))
+    assert max(tried) > 1.0
+    assert later.end[0] == pytest.approx(2.0, abs=1e-6)
+    assert "step size" in later.message
+
+
+def test_one_step_may_not_evaluate_without_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Evaluations of a step are counted anew in each."""
+    monkeypatch.setattr(ode_solvers, "_MAX_STEP_EVALUATIONS", 12)
+    calls = []
+
+    def oscillation(time: float, state: Any) -> list[float]:
+        calls.append(time)
+        return [state[1], -state[0]]
+
+    start = np.array([1.0, 0.0])
+    # DOP853: two evaluations before the first step, eleven in each that is taken at once.
+    ended = INTEGRATORS["DOP853"](oscillation, 0.0, 0.1, start, np.empty(0))
+    assert not ended.message
+    assert len(calls) > 12
+    monkeypatch.setattr(ode_solvers, "_MAX_STEP_EVALUATIONS", 10)
+    calls.clear()
+    ended = INTEGRATORS["DOP853"](oscillation, 0.0, 0.1, start, np.empty(0))
+    assert ended.message == "SciPy: no step is small enough"
+    assert len(calls) == 2 + 10
+
+
+@pytest.mark.parametrize(("times_as_many", "steps"), [(9.0, 5000), (11.0, 2000)])
+def test_a_run_ends_as_soon_as_it_would_take_ten_times_the_steps_that_are_allowed(
+    times_as_many: float, steps: int
+) -> None:
+    """It is estimated after 2,000 steps, of equal length for an oscillation; else it ends at the
+    number that is allowed."""
+
+    def oscillation(_time: float, state: Any) -> list[float]:
+        return [state[1], -state[0]]
+
+    start, nothing = np.array([1.0, 0.0]), np.empty(0)
+    alone = solve_ivp(oscillation, (0.0, 100.0), start, "RK23", rtol=1e-3, atol=1e-6)
+    step = 100.0 / (len(alone.t) - 1)
+    limited = scipy_integrator("RK23", 1e-3, 1e-6, max_steps=5000)
+    # The estimate is of the share of the interval that is crossed, wherever it begins.
+    ended = limited(oscillation, 7.0, 7.0 + times_as_many * 5000 * step, start, nothing)
+    assert ended.message == "SciPy: more than 5000 steps"
+    assert ended.steps == steps
+    enough = limited(oscillation, 7.0, 7.0 + 500 * step, start, nothing)
+    assert not enough.message
 
 
 @pytest.mark.parametrize("name", INTEGRATORS)

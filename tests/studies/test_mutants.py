@@ -156,6 +156,16 @@ EXPLAINED = {
         "keeps rounding from putting a sample past the end of its interval, in runs of thousands "
         "of intervals"
     ),
+    r"ode_solvers\.(_MAX_STEP_EVALUATIONS|_OUTLOOK_STEPS) .*000 -> \d+1$": (
+        "a limit that one more or one less does not miss"
+    ),
+    r"taylor\.__init__ .*keep is not None turned": (
+        "parts of a segment follow each other without a gap, and decide memory alone"
+    ),
+    r"reference\.error_growth .*times is None turned": (
+        "without heyoka alone, where `.ci/without-heyoka` runs the tests"
+    ),
+    r"reference\.__init__ .*1 -> 2": "what stands there before the first run is not read",
     r"ode45\.first_step .*h_max \* rate_of_change scaled": (
         "where it decides, either step is the same"
     ),

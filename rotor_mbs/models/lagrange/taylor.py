@@ -289,9 +289,7 @@ class Propagation:
     def observe(self) -> Trajectory:
         """Return the samples of the last run in doubles, with the work in J."""
         states = self.states.astype(float)
-        if self._scene.work_needs_path and states.shape[1] > 2 * len(
-            self._scene.moving_coordinates
-        ):
+        if self._scene.work_needs_path:  # the work is the last variable
             states[:, -1] *= work_unit(self._scene)
         return samples.trajectory(self._scene, self.times, states)
 
