@@ -1,7 +1,8 @@
 """Describe a scene as plain numbers: the rotor, what acts on it, and how it starts.
 
-It is all that every model gets. A key of the scene file is one field, from which reading, hash,
-keys of sweeps, units and the written file follow.
+A scene is the only input of a model. Each key of the scene file is declared by one field of `Scene`
+or `Blade`. The declaration determines how the key is read and written, its unit, its part in the
+hash of the scene, and its name in a sweep.
 """
 
 from __future__ import annotations
@@ -62,26 +63,28 @@ if TYPE_CHECKING:
 
 
 DEFAULT_OUTPUTS = ("angles", "rates", "tip", "energy")
-OUTPUTS = (*DEFAULT_OUTPUTS, "loads")  # built in
-# A package adds the output that its entry point in this group is called.
+OUTPUTS = (*DEFAULT_OUTPUTS, "loads")  # the built-in outputs
+# Another package adds an output by an entry point in this group, which has the output's name.
 ENTRY_POINT_GROUP = "rotor_mbs.quantities"
 
-# The names of some 4,000 coordinates have no room in an attribute of an HDF5 file.
+# One attribute of an HDF5 file has the labels of all coordinates. It has no room for 4,000.
 MAX_BLADES = 1000
 MAX_SAMPLES = 10_000_000
 MAX_SAMPLE_BYTES = 2 << 30
 MAX_CONE = 1.5  # rad
-_SHOWN_KEYS, _SHOWN_ENTRIES = 30, 6  # of a scene on a screen, and of a list
-# Principal moments may break the triangle inequality by this share of their sum: numbers typed
-# with ten digits do so for a flat body, whose inequality is an equality. It is far above the
-# round-off of the eigenvalues (1e-15).
+# Most keys of a scene that are shown on a screen, and most entries of a list that are shown.
+_SHOWN_KEYS, _SHOWN_ENTRIES = 30, 6
+# A second moment of mass may be negative by this share of the inertia's trace. A flat body has a
+# second moment of zero, which is slightly negative if the inertia is typed with ten digits. The
+# share is far above the round-off of the eigenvalues (1e-15).
 INERTIA_TOLERANCE = 1e-9
 
-# (values of a file by field) -> what another layer finds wrong with them: methods, their settings.
+# (values of a file by field) -> problems of the values that another layer checks: the methods and
+# their settings.
 ValuesCheck = Callable[[Mapping[str, Any]], list[KeyProblem]]
 
-# What a field is to a run. label: no number of the scene; run: what is computed; start: initial
-# state; rotor: parameters and loads.
+# What a field means to a run. label: texts, and the methods and settings to use; run: duration,
+# samples and outputs; start: the initial state; rotor: parameters and loads.
 FieldRole = Literal["label", "run", "start", "rotor"]
 
 
@@ -90,7 +93,10 @@ FieldRole = Literal["label", "run", "start", "rotor"]
 
 @functools.cache
 def known_outputs() -> tuple[str, ...]:
-    """Return the outputs that a scene may ask for: built-in ones, then sorted those of packages."""
+    """Return the outputs that a scene may ask for: first the built-in ones, then the others.
+
+    The others are those that packages add, sorted by name.
+    """
     from importlib.metadata import entry_points
 
     added = {point.name for point in entry_points(group=ENTRY_POINT_GROUP)}
@@ -98,8 +104,8 @@ def known_outputs() -> tuple[str, ...]:
 
 
 def _read_outputs(value: object) -> tuple[str, ...]:
-    """Return the built-in outputs in their order, then the others, sorted."""
-    # Installed packages are searched only for what is not built in.
+    """Return the outputs of a scene, in the order of `known_outputs`."""
+    # Installed packages are searched only if an output is not built in.
     is_built_in = isinstance(value, list) and all(name in OUTPUTS for name in value)
     known = OUTPUTS if is_built_in else known_outputs()
     outputs = list_of(keys.choice(known), "").read(value)
@@ -111,18 +117,18 @@ def _read_outputs(value: object) -> tuple[str, ...]:
 
 
 def is_rigid_body_inertia(inertia: Sequence[float]) -> bool:
-    """Return whether a distribution of mass, nowhere negative, has this inertia.
+    """Return whether a rigid body can have this inertia.
 
-    So it is where the second moments ½ tr(J) I - J are positive semidefinite: the triangle
-    inequality of the principal moments.
+    The matrix of the second moments of mass, ½ tr(J) I - J, must be positive semidefinite, as no
+    mass is negative. The principal moments then fulfil the triangle inequality.
 
     Parameters
     ----------
-    inertia : xx yy zz xy xz yz of the tensor about the centre of mass, kg m².
+    inertia : elements xx yy zz xy xz yz of the tensor J about the centre of mass, kg m².
     """
     if not any(inertia):
         return True
-    import numpy as np  # late: a point mass, as in every scene of the paper, does without
+    import numpy as np  # late: a point mass, as in every scene of the paper, does not need it
 
     xx, yy, zz, xy, xz, yz = inertia
     if min(xx, yy, zz) < 0.0:
@@ -134,18 +140,19 @@ def is_rigid_body_inertia(inertia: Sequence[float]) -> bool:
 
 
 def _read_load(value: object) -> LoadTable:
-    """Return a table over time, (time, value) in each row, from its rows or a constant.
+    """Return a load as a table over time with rows (time, value).
 
-    It is () if it is zero at all times.
+    The table of a load that is zero at all times is ().
 
     Parameters
     ----------
-    value : as a file has it.
+    value : a constant, or a list of rows [time in s, value].
 
     Raises
     ------
     TableError
-        If a time is below 0 or before the last one, or three rows have the same time.
+        If the value is neither, a time is negative or less than the time of the row before it, or
+        three rows have the same time.
     """
     if not isinstance(value, list):
         constant = keys.SIZE.read(value)
@@ -164,17 +171,17 @@ def _read_load(value: object) -> LoadTable:
 
 
 def _per_blade(kind: Kind) -> Kind:
-    """Return the kind of one value for every pitch bearing, or a list with one for each.
+    """Return the kind of a key that has one value for all pitch bearings, or a list with one each.
 
-    It is read as a tuple, () if all are zero.
+    The key is read as a tuple with an entry per blade, or as () if all entries are zero.
 
     Parameters
     ----------
-    kind : of a single value.
+    kind : the kind of a single value.
     """
 
     def read(value: Any, scene: Mapping[str, Any]) -> tuple[Any, ...]:
-        # Where the number of blades is wrong itself, nothing is said of what depends on it.
+        # If the number of blades is wrong, only that is reported, not what depends on it.
         count = scene.get("blade_count")
         if not isinstance(value, list) or (kind.over_time and value and is_one_table(value)):
             entries = (kind.read(value),) * (count or 1)
@@ -196,7 +203,13 @@ def _per_blade(kind: Kind) -> Kind:
 
 
 def _read_angles(value: object, scene: Mapping[str, Any]) -> tuple[float, ...]:
-    """Return a number for the rotor and one for each pitch; `scene` has the keys before it."""
+    """Return the initial angles or rates: the rotor's, then one for each pitch.
+
+    Parameters
+    ----------
+    value : the list of numbers in the file.
+    scene : values of the earlier keys by field.
+    """
     count = scene.get("blade_count")
     if isinstance(value, list) and count is not None and len(value) != 1 + count:
         raise invalid(f"{counted(len(value), 'number')} for a rotor and {counted(count, 'blade')}")
@@ -205,7 +218,7 @@ def _read_angles(value: object, scene: Mapping[str, Any]) -> tuple[float, ...]:
 
 
 def _read_rates(value: object, scene: Mapping[str, Any]) -> tuple[float, ...]:
-    """Return rates as `_read_angles`, 0 for a pitch without inertia."""
+    """Return the initial rates. Raises TableError if a pitch without inertia has a rate."""
     rates = _read_angles(value, scene)
     _check_bare_pitches("a pitch rate for", rates[1:], scene)
     return rates
@@ -216,9 +229,10 @@ def _check_bare_pitches(what: str, entries: Sequence[Any], scene: Mapping[str, A
 
     Parameters
     ----------
-    what : meaning of such an entry, which precedes the blades in the message.
-    entries : one per blade.
-    scene : values of the earlier keys by field; without the blades nothing is checked.
+    what : words of the message before the numbers of the blades: "acts on", "a pitch rate for".
+    entries : one entry per blade.
+    scene : values of the earlier keys by field. If the blades are not among them, because they
+        could not be read, nothing is checked.
     """
     if "blade_count" not in scene or "blades" not in scene:
         return
@@ -235,17 +249,17 @@ def _check_bare_pitches(what: str, entries: Sequence[Any], scene: Mapping[str, A
 
 
 def _read_blades(value: object, scene: Mapping[str, Any]) -> tuple[Blade, ...]:
-    """Return the blades, from one [blade] table for all or a [[blade]] table for each.
+    """Return the blades, read from one [blade] table for all or a [[blade]] table for each.
 
     Parameters
     ----------
-    value : a table, or a list of them.
+    value : a table, or a list of tables.
     scene : values of the earlier keys by field.
 
     Raises
     ------
     TableError
-        For a wrong table, or another number of tables than blades.
+        If a table is wrong, or the number of tables in a list is not the number of blades.
     """
 
     def read_blade(table: object) -> Blade:
@@ -255,7 +269,7 @@ def _read_blades(value: object, scene: Mapping[str, Any]) -> tuple[Blade, ...]:
         if "tip" not in table and "tip" in scene.get("outputs", ()):
             missing.append(KeyProblem(("tip",), "is missing", BLADE_KEYS["tip"]["allowed"]))
         values = keys.read_keys(BLADE_KEYS, table, lambda _: missing)
-        # A tip that no output needs is some point of the blade.
+        # If no output needs the tip, any point of the blade can stand for it.
         values["tip"] = values["tip"] or values["centre_of_mass"]
         return Blade(**values)
 
@@ -283,7 +297,11 @@ _INERTIA = restricted(
 
 
 def _read_lean(most: float, value: object) -> float:
-    """Return an angle from -most to most, rad. Raises TableError, which says if degrees fit."""
+    """Return the angle of a tilt or cone, from -most to most, rad.
+
+    Raises TableError for other angles. If the number would be allowed in degrees, the message says
+    how to write degrees.
+    """
     angle: float = keys.SIZE.read(value)
     if abs(angle) <= most:
         return angle
@@ -292,7 +310,7 @@ def _read_lean(most: float, value: object) -> float:
 
 
 _TILT = Kind(functools.partial(_read_lean, 0.5 * math.pi), "a number{unit} from -pi/2 to pi/2")
-# At a right angle the pitch axis would be the shaft itself.
+# The limit is below a right angle, at which the pitch axis would lie on the shaft.
 _CONE = Kind(
     functools.partial(_read_lean, MAX_CONE), f"a number{{unit}} from -{MAX_CONE:g} to {MAX_CONE:g}"
 )
@@ -320,7 +338,7 @@ _SETTINGS = keys.dict_of(
 
 @dataclass(frozen=True, slots=True)
 class Blade:
-    """A rigid blade, in its own frame: origin at the apex, z along the pitch axis.
+    """A rigid blade in its own frame, with the origin at the apex and z along the pitch axis.
 
     The apex is the point where all pitch axes meet the shaft.
 
@@ -328,10 +346,11 @@ class Blade:
     ----------
     mass : kg.
     centre_of_mass : (3,) m.
-    inertia : xx yy zz xy xz yz of the tensor about the centre of mass (xy = -∫xy dm), kg m².
+    inertia : elements xx yy zz xy xz yz of the tensor about the centre of mass, kg m², where the
+        element xy is -∫xy dm.
     tip : (3,) m, the point whose path is stored.
-    cone : rad, angle between the pitch axis and the plane normal to the shaft at the apex; above 0
-        the axis leans towards +y, the shaft's end that a tilt above 0 raises.
+    cone : rad, angle between the pitch axis and the plane that is normal to the shaft at the apex.
+        If it is positive, the pitch axis leans towards the +y end of the shaft.
     """
 
     mass: float = file_key("mass", keys.POSITIVE, "kg")
@@ -365,30 +384,30 @@ class Blade:
 
     @property
     def is_point_mass(self) -> bool:
-        """Return whether it has no inertia about its centre of mass."""
+        """Return whether the blade has no inertia about its centre of mass."""
         return not any(self.inertia)
 
     @property
     def inertia_tensor(self) -> NDArray[np.float64]:
         """Return the inertia tensor about the centre of mass, (3, 3) kg m²."""
-        import numpy as np  # late: a scene is read without it
+        import numpy as np  # late: reading a scene does not need it
 
         xx, yy, zz, xy, xz, yz = self.inertia
         return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
     def inertia_about_apex(self, number: Callable[[float], Any] = float) -> tuple[Any, ...]:
-        """Return the inertia about the apex, where the pitch axis meets the shaft.
+        """Return the inertia tensor about the apex, where the pitch axis meets the shaft.
 
         Parameters
         ----------
-        number : kind of number to compute with: float, or Fraction for exact elements.
+        number : type of the numbers to compute with: float, or Fraction for exact elements.
 
         Returns
         -------
         tuple
-            xx yy zz xy xz yz of the tensor J_com + m (r·r I - r rᵀ), kg m², in the blade frame.
-            About the shaft the blade has xx sin²θ + yy cos²θ + 2 xy sin θ cos θ at a pitch of θ,
-            and zz about the pitch axis.
+            Elements xx yy zz xy xz yz of the tensor J_com + m (r·r I - r rᵀ), kg m², in the blade
+            frame. The moment of inertia about the pitch axis is zz. That of a blade without cone
+            about the shaft is xx sin²θ + yy cos²θ + 2 xy sin θ cos θ at a pitch of θ.
         """
         m = number(self.mass)
         x, y, z = map(number, self.centre_of_mass)
@@ -412,7 +431,8 @@ class Blade:
     def has_pitch_inertia(self) -> bool:
         """Return whether the moment of inertia about the pitch axis is not zero.
 
-        It is exactly zero in the paper's Fig. 4b: such a pitch is no coordinate.
+        The moment is exactly zero in the paper's Fig. 4b. A pitch without inertia is not a
+        coordinate of the model.
         """
         x, y, _ = self.centre_of_mass
         return x != 0.0 or y != 0.0 or self.inertia[2] != 0.0
@@ -425,13 +445,14 @@ def _key(
     added: bool = False,
     **more: Any,
 ) -> Any:
-    """Declare a field of the scene that is a key of its file, as `file_key` does.
+    """Declare a field of `Scene` by `file_key`, with its role.
 
     Parameters
     ----------
-    path, *declared, **more : as of `file_key`.
-    role : what the field is to a run.
-    added : whether the key is younger than stored hashes: at its default it does not enter them.
+    path, *declared, **more : arguments of `file_key`.
+    role : what the field means to a run.
+    added : whether the key was added to scenes after hashes had been stored. The hash leaves the
+        key out if it has its default, so that these hashes are still valid.
     """
     return file_key(path, *declared, role=role, added=added, **more)
 
@@ -440,35 +461,38 @@ def _key(
 class Scene:
     """A rotor with its loads and initial state.
 
-    Blade i is mounted at 2π(i-1)/blades about the shaft, whose direction is +y without tilt; z is
-    up. The axes of blade i in the base frame are the columns of
-    Rx(tilt) Ry(q + 2π(i-1)/blades) Rx(-cone_i) Rz(θ_i), q the rotor's angle and θ_i the pitch.
+    In the base frame z is up, and the shaft points along +y if it is not tilted. Blade i is mounted
+    at 2π(i-1)/blades about the shaft. Its axes in the base frame are the columns of
+    Rx(tilt) Ry(q + 2π(i-1)/blades) Rx(-cone_i) Rz(θ_i), where q is the rotor angle and θ_i the
+    pitch.
 
     Attributes
     ----------
-    name, title, figures : how it is called, in one line, and the paper's figures that show it.
+    name, title, figures : the name, a title in one line, and the paper's figures that show the
+        scene.
     gravity : m/s², along -z.
-    duration, samples : s; number of equally spaced samples, both ends included.
-    outputs : what is stored of a run.
+    duration, samples : duration in s; number of equally spaced samples, both ends included.
+    outputs : names of the groups of quantities that a run stores.
     blades : (blades,) `Blade`.
     hub_inertia, shaft_damping : kg m² about the shaft; N m s/rad.
-    hub_radius : m from the apex to each blade's root along its pitch axis: where root loads are
-        given.
-    hub_mass : kg, at the apex; it enters the shaft's loads alone.
-    shaft_tilt : rad, by which the shaft's +y end is raised, about x.
+    hub_radius : m, distance from the apex to each blade's root along its pitch axis. Root loads are
+        given at this point.
+    hub_mass : kg, at the apex; it changes only the loads of the shaft.
+    shaft_tilt : rad, angle about x by which the +y end of the shaft is raised.
     initial_angles, initial_rates : (1 + blades,) rad, rad/s: rotor, then a pitch per blade.
-    rotor_torque : a table over time (see time_table), N m.
-    pitch_torque : (blades,) tables over time, N m, between hub and blade; positive in the direction
-        of the pitch.
+    rotor_torque : table over time (see `time_table`), N m.
+    pitch_torque : (blades,) tables over time, N m. The torque acts between hub and blade, and is
+        positive in the direction of the pitch.
     bearing_stiffness, bearing_damping : (blades,) N m/rad, N m s/rad.
-    bearing_rest : (blades,) tables over time, rad: pitch at which the spring is unloaded.
-    methods, settings : methods that `run` uses, and their settings; () for the default selection.
-    text : the TOML text it was read from.
+    bearing_rest : (blades,) tables over time, rad: pitch at which the bearing's spring is unloaded.
+    methods, settings : methods that `run` uses, and their settings. If `methods` is (), `run`
+        selects the methods.
+    text : the TOML text from which the scene was read.
 
     Notes
     -----
-    Loads, springs and dampers that are zero are stored as (). The constructor does not validate;
-    `load`, `scene` and `replace` do.
+    Torques, rest angles, stiffnesses and bearing dampings that are zero are stored as (). The
+    constructor does not validate its arguments; `load_scene`, `parse_scene` and `replace` do.
     """
 
     name: str = _key("", keys.TEXT, role="label")
@@ -562,14 +586,14 @@ class Scene:
     text: str = _key("", keys.TEXT, role="label", default="")
 
     def __repr__(self) -> str:
-        """Show the keys of the scene with their units, long tables cut off, on one screen."""
+        """Return the keys of the scene with units and values, shortened to fit on one screen."""
         lines = [f"{self.label}: {self.title}"]
         for key, unit, value in _short_keys(self):
             lines.append(f"  {key + (f', {unit}' if unit else ''):28} {value}".rstrip())
         return "\n".join(lines)
 
     def _repr_html_(self) -> str:
-        from html import escape  # late: a scene is read without it
+        from html import escape  # late: reading a scene does not need it
 
         rows = ""
         for cells in _short_keys(self):
@@ -581,8 +605,11 @@ class Scene:
 
     @property
     def label(self) -> str:
-        """Return its name; with changes to a shipped scene, "paper/fig11, changed: blade.mass"."""
-        from rotor_mbs.scenario.catalogue import scene_label  # late: it reads scenes
+        """Return the name, with the keys that were changed if the scene was a shipped one.
+
+        An example is "paper/fig11, changed: blade.mass".
+        """
+        from rotor_mbs.scenario.catalogue import scene_label  # late: it imports this module
 
         return scene_label(self)
 
@@ -612,14 +639,17 @@ class Scene:
 
         Constant loads are included.
 
-        This is the one order of the loads of a scene; `time_table.torque_place` and `rest_place`
-        have their places.
+        All code has the loads of a scene in this order. `time_table.torque_place` and `rest_place`
+        return the place of a load in it.
         """
         return (self.rotor_torque, *(table for pair in self.pitch_loads for table in pair))
 
     @property
     def load_segments(self) -> tuple[Segment, ...]:
-        """Return the segments of a run in which loads are linear, in the order of `load_tables`."""
+        """Return the segments of a run on which every load is linear.
+
+        The loads of a segment are in the order of `load_tables`.
+        """
         return segments(self.load_tables, self.duration)
 
     @property
@@ -641,8 +671,8 @@ class Scene:
     def work_needs_path(self) -> bool:
         """Return whether the work is requested and must be integrated along the path.
 
-        The work of constant loads follows from the angles; that of dampers and of loads over time
-        does not.
+        The work of constant loads follows from the angles. The work of dampers, and of loads that
+        change over time, does not.
         """
         return self.wants("energy") and (self.has_damping or not self.has_constant_loads)
 
@@ -653,7 +683,7 @@ class Scene:
 
     @property
     def moving_coordinates(self) -> list[int]:
-        """Return the columns of the coordinates with inertia: 0 (rotor), and those of pitches."""
+        """Return the numbers of the coordinates with inertia: 0 (rotor), i for the pitch i."""
         pitches = [i for i, blade in enumerate(self.blades, 1) if blade.has_pitch_inertia]
         return [0, *pitches]
 
@@ -672,7 +702,7 @@ class Scene:
     def pitch_loads(self) -> list[tuple[LoadTable, LoadTable]]:
         """Return the torque (N m) and the rest angle (rad) of each pitch over time.
 
-        A rest angle without stiffness is ().
+        If a bearing has no stiffness, its rest angle has no effect and is returned as ().
         """
         none: tuple[LoadTable, ...] = ((),) * len(self.blades)
         torques, rests = self.pitch_torque or none, self.bearing_rest or none
@@ -683,30 +713,35 @@ class Scene:
 
     @property
     def rotor_key(self) -> tuple[object, ...]:
-        """Return parameters and loads, equal for scenes that differ only in start, run or label."""
+        """Return the values of all fields whose role is "rotor": the parameters and the loads.
+
+        Scenes that differ only in fields of other roles have equal keys.
+        """
         return tuple(_rotor_values(self))
 
     def replace(self, **changes: Any) -> Scene:
-        """Return a scene with other values of some keys of the scene file, validated like a file.
+        """Return a copy of the scene with some keys changed, validated like a scene file.
 
         Parameters
         ----------
         **changes
-            Each keyword is a key; keys with dots or indices are given as a dict. Entries are
-            counted from 0: `initial.angles[1]` is the pitch of blade 1. A value is a number, an
-            expression in quotes, or a list (tuple, array), as in a scene file.
+            Each keyword is a key of the scene file. Keys with dots or indices are passed as a dict,
+            `**{"blade.mass": 1e4}`. Entries are counted from 0: `initial.angles[1]` is the pitch of
+            blade 1. A value is a number, an expression in quotes, or a list (tuple, array), as in a
+            scene file.
 
         Returns
         -------
         Scene
-            Its `text` is rewritten from the numbers.
+            The changed scene. Its `text` is written from its values.
 
         Raises
         ------
         InputError
-            A line for each error: the key, what is wrong, what is allowed, the most similar key.
+            With a line for each error: the key, what is wrong, what is allowed, the most similar
+            key.
         TypeError
-            For a value that no file can have, such as None.
+            If a value cannot be in a file, such as None.
 
         Examples
         --------
@@ -726,7 +761,7 @@ class Scene:
         return dataclasses.replace(changed, text=scene_toml(changed))
 
     def wants(self, output: str) -> bool:
-        """Return whether an output is asked for."""
+        """Return whether the scene asks for an output."""
         return output in self.outputs
 
     def torque_at(self, time: float) -> float:
@@ -735,7 +770,7 @@ class Scene:
 
 
 def coordinate_labels(blades: int) -> tuple[str, ...]:
-    """Return the labels of the coordinates of a rotor with so many blades."""
+    """Return the labels of the coordinates of a rotor, given its number of blades."""
     return ("rotor", *(f"pitch {i + 1}" for i in range(blades)))
 
 
@@ -747,8 +782,8 @@ _COUNT = file_key(
     "1",
     ": blade i at 2 pi (i - 1)/blades about the shaft",
 )
-# In this order keys are read and written. The number of blades is no field of a scene, and has to
-# be known before what depends on it.
+# Keys are read in this order, in which `new_scene_text` lists them, too. The number of blades is no
+# field of `Scene`; it comes before the keys that depend on it.
 SCENE_KEYS = {
     "title": _FIELD_KEYS["title"],
     "figures": _FIELD_KEYS["figures"],
@@ -761,7 +796,7 @@ _BY_PATH = {declared["key"]: declared for declared in SCENE_KEYS.values()} | {
 
 
 def scene_fields(*roles: FieldRole) -> Iterator[Field[Any]]:
-    """Yield the fields of a scene that have one of some roles."""
+    """Yield the fields of `Scene` that have one of the given roles."""
     return (field for field in fields(Scene) if field.metadata["role"] in roles)
 
 
@@ -769,10 +804,10 @@ _rotor_values = attrgetter(*(field.name for field in scene_fields("rotor")))
 
 
 def scene_hash(scene: Scene) -> str:
-    """Return a SHA-256, in hexadecimal, over all that a run of a scene depends on.
+    """Return the SHA-256, in hexadecimal, of the values of a scene that determine its motion.
 
-    These are its numbers, bit for bit, and outputs. Name, title, figures and text do not enter;
-    neither does the tip where no tip path is asked for.
+    The hash covers the numbers of the scene, bit for bit, and the outputs. It does not cover fields
+    whose role is "label", nor the tip if its path is not an output.
     """
     content: dict[str, object] = {}
     for field in scene_fields("run", "start", "rotor"):
@@ -785,20 +820,20 @@ def scene_hash(scene: Scene) -> str:
 
 
 def _blade_numbers(blade: Blade, with_tip: bool) -> list[object]:
-    """Return the numbers of a blade as they enter the hash of its scene."""
+    """Return the numbers of a blade that the hash of its scene covers."""
     numbers = []
     for name, declared in BLADE_KEYS.items():
         value = getattr(blade, name)
         is_default_of_added = declared.get("added", False) and value == declared["optional"]
         if is_default_of_added or (name == "tip" and not with_tip):
             continue
-        # A mass in a list, as the other numbers of a blade are: so it is in stored hashes.
+        # A single number, such as the mass, is put in a list, as it was for the stored hashes.
         numbers.append(_exact(value, listed=True))
     return numbers
 
 
 def _exact(value: object, *, listed: bool = False) -> object:
-    """Return a value with its doubles in hexadecimal, which differ wherever a bit does.
+    """Return a value with its floats as hexadecimal text, which shows every bit.
 
     Parameters
     ----------
@@ -812,12 +847,12 @@ def _exact(value: object, *, listed: bool = False) -> object:
 
 
 def values_per_sample(blades: int, outputs: Sequence[str]) -> int:
-    """Return how many doubles a run holds per sample.
+    """Return how many doubles a run has per sample, without the outputs of packages.
 
     Parameters
     ----------
     blades : number of blades.
-    outputs : what is asked for beyond time, angles and rates.
+    outputs : outputs of the scene. Time, angles and rates are counted in any case.
     """
     count = 1 + 2 * (1 + blades)  # time, angles, rates
     if "tip" in outputs:
@@ -839,18 +874,18 @@ def scene_from_tables(
     text: str = "",
     check: ValuesCheck | None = None,
 ) -> Scene:
-    """Return the scene in the tables of a scene file.
+    """Return the scene that the tables of a scene file describe.
 
     Parameters
     ----------
-    tables : as the file has them.
-    name, text : of the scene.
-    check : what else is wrong with the values.
+    tables : content of the file by key.
+    name, text : values of these two fields of the scene.
+    check : further check of the values.
 
     Raises
     ------
     TableError
-        With every error.
+        With all errors of the tables.
     """
 
     def extra_check(values: Mapping[str, Any]) -> list[KeyProblem]:
@@ -877,7 +912,7 @@ def scene_tables(scene: Scene) -> dict[str, Any]:
 
     Parameters
     ----------
-    scene : its numbers are returned as they are.
+    scene : the scene; its numbers are neither rounded nor formatted.
     """
     tables: dict[str, Any] = {"blades": len(scene.blades)}
     for field in fields(Scene):
@@ -902,12 +937,12 @@ def scene_tables(scene: Scene) -> dict[str, Any]:
 
 
 def _blade_tables(scene: Scene) -> dict[str, Any] | list[dict[str, Any]]:
-    """Return the table of a scene's blades, or where they differ the tables of all."""
+    """Return one table if all blades of a scene are equal, otherwise a table for each."""
     are_equal = len(set(scene.blades)) == 1
     written = []
     for blade in scene.blades[:1] if are_equal else scene.blades:
         table = {key: _listed(getattr(blade, key)) for key in BLADE_KEYS}
-        # A tip that only repeats the centre of mass was not given.
+        # A tip that is not needed and equals the centre of mass was not in a file.
         if blade.tip == blade.centre_of_mass and not scene.wants("tip"):
             del table["tip"]
         if not blade.cone:
@@ -917,11 +952,11 @@ def _blade_tables(scene: Scene) -> dict[str, Any] | list[dict[str, Any]]:
 
 
 def scene_keys(scene: Scene) -> list[tuple[KeyPath, Any]]:
-    """Return the path and the value of each key of a scene's file.
+    """Return the path and the value of each key in the `scene_tables` of a scene.
 
     Parameters
     ----------
-    scene : its keys are those of `scene_tables`.
+    scene : the scene.
     """
     found: list[tuple[KeyPath, Any]] = []
 
@@ -941,9 +976,10 @@ def scene_keys(scene: Scene) -> list[tuple[KeyPath, Any]]:
 
 
 class SceneChange(NamedTuple):
-    """A key of which two scenes have different values, None where one of them has none.
+    """A key that has different values in two scenes.
 
-    Prints as "blade.mass 15000 -> 15010".
+    A value is None if the scene does not have the key. The text of a change is like
+    "blade.mass 15000 -> 15010".
     """
 
     path: KeyPath
@@ -952,7 +988,7 @@ class SceneChange(NamedTuple):
 
     @property
     def key(self) -> str:
-        """Return the key as it is written, "initial.angles[1]"."""
+        """Return the key as text, such as "initial.angles[1]"."""
         return shown_key(self.path)
 
     def __str__(self) -> str:
@@ -960,13 +996,13 @@ class SceneChange(NamedTuple):
 
 
 def scene_changes(before: Scene, after: Scene, ignored: Sequence[str] = ()) -> list[SceneChange]:
-    """Return what differs between two scenes, a change for each key or entry of a list.
+    """Return the differences of two scenes: a change for each key, or each entry of a list.
 
     Parameters
     ----------
-    before, after : their titles, figures, methods and settings are not compared; the tip is where
-        both store its path.
-    ignored : keys that are not compared either.
+    before, after : the scenes. Titles, figures, methods and settings are not compared. The tip is
+        compared if both scenes store its path.
+    ignored : further keys that are not compared.
     """
     are_unequal = any(len(set(scene.blades)) > 1 for scene in (before, after))
     left_out = {field.metadata["key"] for field in scene_fields("label")} | {*ignored}
@@ -981,12 +1017,12 @@ def scene_changes(before: Scene, after: Scene, ignored: Sequence[str] = ()) -> l
 
 
 def _values_by_path(scene: Scene, *, each_blade: bool) -> dict[KeyPath, Any]:
-    """Return the values of a scene's keys, loads that are constant as numbers.
+    """Return the values of a scene's keys by path, with constant loads as numbers.
 
     Parameters
     ----------
-    scene : Scene
-    each_blade : whether equal blades have a table each, as unequal ones have.
+    scene : the scene.
+    each_blade : whether each of several equal blades has its own paths, as unequal blades have.
     """
     values: dict[KeyPath, Any] = {}
     for path, value in scene_keys(scene):
@@ -999,7 +1035,7 @@ def _values_by_path(scene: Scene, *, each_blade: bool) -> dict[KeyPath, Any]:
 
 
 def _entry_changes(path: KeyPath, before: Any, after: Any) -> Iterator[SceneChange]:
-    """Yield the change of a value, of lists with as many entries those of their entries."""
+    """Yield the change of a value; for two lists of equal length, the change of each entry."""
     are_lists = isinstance(before, list) and isinstance(after, list) and len(before) == len(after)
     if are_lists and path != ("outputs",):
         for i, (old, new) in enumerate(zip(before, after, strict=True)):
@@ -1009,7 +1045,7 @@ def _entry_changes(path: KeyPath, before: Any, after: Any) -> Iterator[SceneChan
 
 
 def _exact_text(value: Any) -> str:
-    """Return a value with all its digits, a list of at most six entries."""
+    """Return a value as text: numbers with all digits, lists with at most six entries."""
     if value is None:
         return "none"
     if not isinstance(value, list):
@@ -1021,7 +1057,7 @@ def _exact_text(value: Any) -> str:
 
 
 def without_times(value: Any) -> Any:
-    """Return a value of a scene file; a load over time whose table has one row as that number."""
+    """Return a value of a scene file, with the number in place of each table of one row."""
     match value:
         case [[float(), float() as number]]:
             return number
@@ -1031,7 +1067,7 @@ def without_times(value: Any) -> Any:
 
 
 def _short_keys(scene: Scene) -> list[tuple[str, str, str]]:
-    """Return key, unit and value as text of as many keys as a screen has room for."""
+    """Return the keys of a scene that a screen has room for, as rows of text: key, unit, value."""
     rows = []
     for path, value in scene_keys(scene):
         unit = unit_of(path)
@@ -1039,7 +1075,7 @@ def _short_keys(scene: Scene) -> list[tuple[str, str, str]]:
             rows.append(
                 (shown_key(path), "" if unit == "1" else unit, _short_value(without_times(value)))
             )
-    # unequal blades last: there may be hundreds
+    # The keys of unequal blades come last, as there may be hundreds of blades.
     rows.sort(key=lambda row: row[0].startswith("blade["))
     if len(rows) > _SHOWN_KEYS:
         rows[_SHOWN_KEYS:] = [(f"... {len(rows) - _SHOWN_KEYS} more keys", "", "")]
@@ -1047,7 +1083,7 @@ def _short_keys(scene: Scene) -> list[tuple[str, str, str]]:
 
 
 def _short_value(value: Any) -> str:
-    """Return a value of at most six digits, a list of at most six entries."""
+    """Return a value as text: numbers with at most six digits, lists with at most six entries."""
     if isinstance(value, float):
         return f"{value:.6g}"
     if not isinstance(value, list):
@@ -1064,9 +1100,9 @@ def _listed(value: Any) -> Any:
 
 
 def scene_toml(scene: Scene) -> str:
-    """Return a scene file with the scene's numbers bit for bit.
+    """Return the text of a scene file with the scene's numbers bit for bit.
 
-    Comments and expressions of the file that it was read from are not kept.
+    Comments and expressions of the file from which the scene was read are not kept.
     """
     top, parts = {}, []
     for name, value in scene_tables(scene).items():
@@ -1080,7 +1116,7 @@ def scene_toml(scene: Scene) -> str:
 
 
 def unit_of(path: KeyPath) -> str:
-    """Return the unit of the number at a path of a scene file, "1" where it has none."""
+    """Return the unit of the number at a path of a scene file; "1" if it has no unit."""
     declared = _BY_PATH.get(_names(path))
     if declared is None:
         return "1"
@@ -1092,7 +1128,7 @@ def unit_of(path: KeyPath) -> str:
 
 
 def _names(path: KeyPath) -> str:
-    """Return the key that a path goes through, without the numbers of entries."""
+    """Return the names in a path, joined by dots, without the numbers of list entries."""
     return ".".join(part for part in path if isinstance(part, str))
 
 
@@ -1101,14 +1137,15 @@ def put_value(tables: dict[str, Any], path: KeyPath, value: object) -> None:
 
     Parameters
     ----------
-    tables : are changed. One value for every blade becomes one for each where the path names one.
-    path : of the value. Whether there is such a key is not checked.
-    value : as the file would have it.
+    tables : tables of the file, which are changed. If they have one value for all blades, and the
+        path names one blade, every blade first gets a copy of the value.
+    path : path of the value. Whether a scene can have this key is not checked here.
+    value : the value as a file would have it.
 
     Raises
     ------
     TableError
-        If the path goes through something that has no such entry.
+        If a list on the path has too few entries, or a value on the path is of the wrong type.
     """
     here: Any = tables  # a table or a list
     for depth, part in enumerate(path):
@@ -1132,7 +1169,7 @@ def _no_such_entry(container: Any, path: KeyPath, depth: int) -> KeyProblem:
     Parameters
     ----------
     container : the value at `path[:depth]`, which has no entry `path[depth]`.
-    path : of the key.
+    path : path of the key.
     depth : number of parts of the path that exist.
     """
     above, part = path[:depth], path[depth]
@@ -1156,13 +1193,16 @@ def _no_such_entry(container: Any, path: KeyPath, depth: int) -> KeyProblem:
 
 
 def _as_list(tables: Mapping[str, Any], value: Any, path: KeyPath, last: int) -> Any:
-    """Return the value at a path, as a list with an entry per blade if a file may have one for all.
+    """Return the value at a path as a list, of which one entry can be set.
+
+    One value for all blades becomes a list with a copy for each blade. A missing value becomes a
+    list of zeros. Any other value is returned as it is.
 
     Parameters
     ----------
-    tables : of the scene file, for the number of blades.
-    value : at the path; None if the key is missing.
-    path : of the value.
+    tables : tables of the scene file, which have the number of blades.
+    value : value at the path; None if the key is missing.
+    path : path of the value.
     last : number of the entry that is to be set.
     """
     count = tables.get("blades", 0)
@@ -1172,7 +1212,7 @@ def _as_list(tables: Mapping[str, Any], value: Any, path: KeyPath, last: int) ->
     is_per_blade = declared is not None and declared["kind"].per_blade and isinstance(path[-1], str)
     if is_per_blade and (not isinstance(value, list) or is_one_table(value)):
         return [copy.deepcopy(0.0 if value is None else value) for _ in range(count)]
-    # Whether a list that is missing could be there is for the readers of the keys to say.
+    # Whether a scene can have this list is checked later, when its keys are read.
     return [0.0] * (last + 1) if value is None else value
 
 
@@ -1186,22 +1226,22 @@ def load_scene(
 
     Parameters
     ----------
-    path : of the file.
-    name : of the scene; by default that of the file without its ending.
-    check : what else is wrong with the values.
-    stacklevel : of warnings, as of `warnings.warn`.
+    path : path of the file.
+    name : name of the scene; by default the name of the file without its ending.
+    check : further check of the values.
+    stacklevel : argument of `warnings.warn`.
 
     Raises
     ------
     InputError
-        With all errors of the file, a line each: `file:line: key: what is wrong; allowed: ...`.
-        Entries are counted from 0.
+        With a line for each error: `file:line: key: what is wrong; allowed: ...`. Entries are
+        counted from 0.
 
     Warns
     -----
     PlausibilityWarning
-        For each number that looks like a slip. Shipped scenes, whose names have a folder, are not
-        looked at.
+        For each number that looks like a mistake. Shipped scenes, whose names have a folder, are
+        not checked for such numbers.
     """
     path = Path(path)
     name = path.stem if name is None else name
@@ -1216,9 +1256,9 @@ def load_scene(
 
 
 def parse_scene(text: str, name: str) -> Scene:
-    """Return the scene in a TOML text, as it is stored with results.
+    """Return the scene that a TOML text describes; results are stored with such a text.
 
-    Raises InputError as `load_scene`, with `name` in place of the file.
+    Raises InputError with lines like those of `load_scene`, with `name` in place of the file.
     """
     file = parse_toml(text, name)
     with file.with_line_numbers():
@@ -1250,11 +1290,11 @@ _LAST_COLUMN = 117
 
 
 def new_scene_text() -> str:
-    """Return a scene file with every key, a value and what is allowed, to start a scene from."""
-    lines: dict[str, list[str]] = {"": _HEADER.splitlines(), "blade": []}  # by table
+    """Return the text of a scene file from which users can start, with a comment on every key."""
+    lines: dict[str, list[str]] = {"": _HEADER.splitlines(), "blade": []}  # lines of each table
     required = {"blade"}
     for path, declared in _BY_PATH.items():
-        if path in ("blade", "settings"):  # tables
+        if path in ("blade", "settings"):  # these are tables
             continue
         table, _, name = path.rpartition(".")
         value = _EXAMPLE.get(path, declared.get("optional"))
@@ -1263,7 +1303,7 @@ def new_scene_text() -> str:
         comment = declared["allowed"]
         if "optional" not in declared:
             required.add(table)
-        elif table in ("", "blade"):  # the header of another table says so
+        elif table in ("", "blade"):  # other tables say so in the header
             comment = f"optional: {comment}"
         entry = f"{name} = {toml_value(value)}"
         lines.setdefault(table, []).extend(_commented(entry, comment))
@@ -1279,7 +1319,7 @@ def new_scene_text() -> str:
 
 
 def _commented(entry: str, comment: str) -> list[str]:
-    """Return the lines of an entry of a TOML file with a comment behind it, wrapped."""
+    """Return the lines of an entry of a TOML file, with a wrapped comment at its right."""
     width = _LAST_COLUMN - max(_COMMENT_COLUMN, len(entry))
     first, *others = textwrap.wrap(comment, width)
     lines = [f"{entry:{_COMMENT_COLUMN}} # {first}"]
@@ -1288,22 +1328,23 @@ def _commented(entry: str, comment: str) -> list[str]:
     return lines
 
 
-# Numbers that are allowed but implausible: degrees for radians, millimetres for metres, tonnes.
+# Warnings of numbers that are allowed but implausible: perhaps degrees in place of radians,
+# millimetres in place of metres, or tonnes in place of kilograms.
 
 TURN = 2.0 * math.pi
-MAX_RATE = 100.0  # rad/s: a thousand revolutions per minute
-# m, from the shaft to the farthest point of a blade: the longest built have 130.
+MAX_RATE = 100.0  # rad/s, about a thousand revolutions per minute
+# Distances of a blade's centre of mass and tip from the apex, m. The longest blades have 130 m.
 MIN_DISTANCE, MAX_DISTANCE = 0.01, 300.0
 MIN_MASS, MAX_MASS = 0.01, 1e6  # kg
-MAX_LEAN = 0.5  # rad, of shaft and pitch axes: real rotors have 0.1
-USUAL_GRAVITY = (1.0, 30.0)  # m/s^2: the Moon, Jupiter
-KEYS_OF_LOADS = ("hub.radius", "hub.mass")  # that enter the loads alone
+MAX_LEAN = 0.5  # rad, tilt or cone; real rotors have about 0.1
+USUAL_GRAVITY = (1.0, 30.0)  # m/s^2; the Moon has 1.6, Jupiter 25
+KEYS_OF_LOADS = ("hub.radius", "hub.mass")  # keys that change only the loads, not the motion
 
 
 def implausible_values(scene: Scene) -> list[str]:
-    """Return a line for each number that looks like a slip: key, value, what may be meant."""
+    """Return a line for each number that looks like a mistake: key, value, what may be meant."""
     lines = _implausible_motion(scene)
-    # Equal blades stand in the file once.
+    # Equal blades have one table.
     if len(set(scene.blades)) == 1:
         lines += _implausible_blade("blade", scene.blades[0])
     else:
@@ -1315,7 +1356,7 @@ def implausible_values(scene: Scene) -> list[str]:
 
 
 def _implausible_hub(scene: Scene) -> list[str]:
-    """Return a line for each number of hub and shaft that looks like a slip."""
+    """Return a line for each number of hub and shaft that looks like a mistake."""
     lines = []
     if abs(scene.shaft_tilt) > MAX_LEAN:
         lines.append(f"shaft.tilt: {_as_wide_angle(scene.shaft_tilt)}")
@@ -1329,19 +1370,19 @@ def _implausible_hub(scene: Scene) -> list[str]:
 
 
 def _as_wide_angle(angle: float) -> str:
-    """Return the advice for a tilt or cone (rad) that is far above that of real rotors."""
+    """Return the warning of a tilt or cone (rad) that is far larger than in real rotors."""
     return f"{angle:g} rad are {math.degrees(angle):.3g} degrees{_degrees_meant(angle)}"
 
 
 def _implausible_motion(scene: Scene) -> list[str]:
-    """Return a line for each angle, rate and rest angle that seems to be in degrees.
+    """Return a line for each angle and rate in a scene that seems to be in degrees.
 
     Parameters
     ----------
     scene : the scene, with angles in rad and rates in rad/s.
     """
     lines = []
-    # Where one is more than a turn, other whole numbers are in degrees, too.
+    # If one angle is more than a turn, the others that are whole numbers may be in degrees, too.
     in_degrees = any(abs(angle) > TURN for angle in scene.initial_angles)
     for i, angle in enumerate(scene.initial_angles):
         is_whole = abs(angle) >= 1.0 and angle == round(angle)
@@ -1359,15 +1400,16 @@ def _implausible_motion(scene: Scene) -> list[str]:
 
 
 def _as_degrees(angle: float) -> str:
-    """Return the advice for an angle (rad) that seems to be in degrees."""
+    """Return the warning of an angle (rad) that seems to be in degrees."""
     turns = round(abs(angle) / TURN, 1)
     return f"{angle:g} rad are {turns:.6g} turns{_degrees_meant(angle)}"
 
 
 def _degrees_meant(number: float, unit: str = "degrees") -> str:
-    """Return the advice for a number that seems to be in degrees.
+    """Return the advice to write deg(x), for a number that seems to be in degrees.
 
-    It is "" for one of more than six digits: it was computed, by deg(x) or from pi.
+    The advice is "" if the number has more than six digits: the user has then computed it, by
+    deg(x) or from pi.
     """
     if float(f"{number:.6g}") != number:
         return ""
@@ -1375,11 +1417,11 @@ def _degrees_meant(number: float, unit: str = "degrees") -> str:
 
 
 def _implausible_blade(name: str, blade: Blade) -> list[str]:
-    """Return a line for each number of a blade that seems to be a mistake.
+    """Return a line for each number of a blade that looks like a mistake.
 
     Parameters
     ----------
-    name : of the blade in the line.
+    name : name of the blade in the lines, such as "blade[0]".
     blade : the blade, in SI units.
     """
     lines = []
@@ -1389,7 +1431,8 @@ def _implausible_blade(name: str, blade: Blade) -> list[str]:
         distance = math.hypot(*point)
         if not MIN_DISTANCE <= distance <= MAX_DISTANCE:
             lines.append(f"{name}.{key}: {distance:g} m from the shaft; is it in m?")
-    # No mass is much farther away than the tip, so that no radius of gyration is.
+    # No mass is much farther from the apex than the tip. The radius of gyration, a mean distance of
+    # the mass, is therefore not much larger, either.
     gyration = math.sqrt(max(blade.inertia[:3]) / blade.mass) if blade.mass else 0.0
     if gyration > 2.0 * math.hypot(*blade.tip):
         far = f"a radius of gyration of {gyration:.3g} m, far beyond the tip"

@@ -1,9 +1,11 @@
 """Represent prescribed loads over time: tables, linear segments, and stops of an engine.
 
-A table has rows (t, value), t in s. A load is linear between the rows, and constant before the
-first and after the last; two rows with equal t are a jump. A step over a kink or a jump would lose
-its order: a run is cut into segments, in each of which all loads are linear, and these into
-intervals, from one stop of an engine to the next.
+A table has rows (t, value), with t in s. Between two rows the load is linear. Before the first and
+after the last row it is constant. Two rows with equal t are a jump.
+
+An integration step over a kink or a jump would lose its order of convergence. A run is therefore
+divided into segments on which every load is linear. Segments are divided into intervals, from one
+stop of an engine to the next.
 """
 
 from __future__ import annotations
@@ -18,7 +20,7 @@ from fractions import Fraction
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any, TypeVar
 
-if TYPE_CHECKING:  # a scene is read without it
+if TYPE_CHECKING:  # reading a scene does not need NumPy
     import numpy as np
     from numpy.typing import NDArray
 
@@ -27,20 +29,21 @@ if TYPE_CHECKING:  # a scene is read without it
 LoadTable = tuple[tuple[float, float], ...]
 Time = TypeVar("Time", "float", "Array")
 
-# A kink closer to a sample than this share of the sample interval is taken to be on it.
+# A kink that is closer to a sample than this share of the sample interval counts as on the sample.
 ALIGNMENT = 1e-6
-# Rows kept between two samples where a quadrature or the unwrapping of angles needs them: all
-# steps, or at least half as many as this. Fewer rows of a finer step would make the work of
-# dampers less accurate.
+# Most rows that an engine keeps between two samples, if a quadrature or the unwrapping of angles
+# needs them. If there are at most MAX_ROWS steps between the samples, each is a row; otherwise at
+# least MAX_ROWS / 2 rows are kept. With fewer rows the work of dampers would be less accurate.
 MAX_ROWS = 100
-# Samples that are far apart need more of them, or the quadrature misses the first decay of a
-# damped pitch: one in so many seconds, up to this number, which bounds the memory.
-_ROW_STEP = 5e-4
+# If samples are far apart, MAX_ROWS rows are too few: the quadrature would miss the first decay of
+# a damped pitch. The limit is then a row in _ROW_STEP seconds, but at most _MOST_ROWS rows, which
+# limits the memory.
+_ROW_STEP = 5e-4  # s
 _MOST_ROWS = 1000
-# Rows of a segment, at least, where they are integrated by polynomials through so many.
+# Work is integrated by polynomials through so many rows; `step_within` makes a segment have them.
 POLYNOMIAL_ROWS = 8
 
-# Place of the rotor's torque in `Scene.load_tables`, and in the segments that are cut from it.
+# Place of the rotor torque in `Scene.load_tables`, and among the loads of a `Segment`.
 ROTOR_TORQUE = 0
 
 
@@ -50,12 +53,12 @@ def torque_place(coordinate: int) -> int:
 
 
 def rest_place(coordinate: int) -> int:
-    """Return the place in `Scene.load_tables` of the rest angle of a pitch (1, 2, ...)."""
+    """Return the place in `Scene.load_tables` of the rest angle of a coordinate (1: pitch 1)."""
     return 2 * coordinate
 
 
 def value_at(table: LoadTable, time: float) -> float:
-    """Return a load at `time` (s): at a jump the value after it; 0 where there is no load."""
+    """Return a load at `time` (s): at a jump the value after it; 0 if the table is empty."""
     following = bisect_right(table, time, key=itemgetter(0))
     if following in (0, len(table)):
         return table[max(following - 1, 0)][1] if table else 0.0
@@ -64,9 +67,10 @@ def value_at(table: LoadTable, time: float) -> float:
 
 
 def values_at(table: LoadTable, times: Array) -> Array:
-    """Return a load at (n,) times in s: at a jump the value after it.
+    """Return a load at (n,) times in s: at a jump the value after it; 0 if the table is empty.
 
-    Each value has the bits of `value_at`: the operations are the same, in the same order.
+    Each value has the same bits as that of `value_at`, because the operations and their order are
+    the same.
     """
     import numpy as np
 
@@ -74,7 +78,8 @@ def values_at(table: LoadTable, times: Array) -> Array:
         return np.zeros(len(times))
     rows = np.array(table)
     following = np.searchsorted(rows[:, 0], times, side="right")
-    # Outside the table both neighbours are its first or last row, and the value is that row's.
+    # A time outside the table has the first or the last row as both neighbours. The load then has
+    # the value of this row.
     before, after = np.maximum(following - 1, 0), np.minimum(following, len(rows) - 1)
     (t0, value0), (t1, value1) = rows[before].T, rows[after].T
     with np.errstate(all="ignore"):
@@ -83,14 +88,14 @@ def values_at(table: LoadTable, times: Array) -> Array:
 
 
 def is_constant(table: LoadTable) -> bool:
-    """Return whether a load has one value at all times, or is none."""
+    """Return whether a load has the same value at all times, or its table is empty."""
     return len({value for _, value in table}) <= 1
 
 
 def is_one_table(value: list[Any]) -> bool:
-    """Return whether a list of a scene file is the rows of one table.
+    """Return whether a list of a scene file consists of the rows of one table over time.
 
-    Else it has an entry, a number or rows, for each blade.
+    Otherwise the list has an entry for each blade: a table, or a number.
     """
 
     def is_row(entry: object) -> bool:
@@ -100,12 +105,12 @@ def is_one_table(value: list[Any]) -> bool:
 
 
 def constant_value(table: LoadTable) -> float:
-    """Return the value of a constant load; 0 for one that changes."""
+    """Return the value of a constant load; 0 if the load changes over time."""
     return value_at(table, 0.0) if is_constant(table) else 0.0
 
 
 def kink_times(tables: Iterable[LoadTable], end: float) -> list[float]:
-    """Return the times (s) of kinks and jumps between 0 and `end`, both excluded, increasing."""
+    """Return the sorted times (s) of kinks and jumps between 0 and `end`, both excluded."""
     times: set[float] = set()
     for table in tables:
         if not is_constant(table):
@@ -120,8 +125,9 @@ class Segment:
     Attributes
     ----------
     start, end : s.
-    linear_loads : (offset, slope) of each table that it was cut from, in the order of the tables:
-        the load is offset + slope t at t s. Exact.
+    linear_loads : (offset, slope) of each load, in the order of the tables given to `segments`.
+        The load is offset + slope t, with t in s from the start of the run. The fractions are
+        exact.
     """
 
     start: float
@@ -149,18 +155,18 @@ class Segment:
 
 
 def segments(tables: Sequence[LoadTable], duration: float) -> tuple[Segment, ...]:
-    """Cut a run where a load has a kink or a jump.
+    """Divide a run into segments, at the times at which a load has a kink or a jump.
 
     Parameters
     ----------
-    tables : the loads over time; their order is that of the loads in a segment.
-    duration : s, of the run.
+    tables : the loads over time. Each segment has its loads in the same order.
+    duration : duration of the run, s.
 
     Returns
     -------
     tuple of Segment
-        From 0 to the duration, each beginning where the one before ends; a single one where all
-        loads are constant.
+        The segments from 0 to the duration, without gaps. If all loads are constant there is one
+        segment.
     """
     cuts = [0.0, *kink_times(tables, duration), duration]
     spans = list(itertools.pairwise(cuts))
@@ -173,8 +179,8 @@ def segments(tables: Sequence[LoadTable], duration: float) -> tuple[Segment, ...
         times = [time for time, _ in table]
         linear_loads = []
         for start, end in spans:
-            # The last row up to the start and the first from the end on: no row lies between them.
-            # At a jump these are the rows of the segment's own side.
+            # `before` is the last row at or before the start, `after` the first row at or after the
+            # end. Of the two rows of a jump, this is the row on the side of the segment.
             before = table[max(bisect_right(times, start) - 1, 0)]
             after = table[min(bisect_left(times, end), len(table) - 1)]
             t0, value0 = map(Fraction, before)
@@ -191,12 +197,12 @@ def segments(tables: Sequence[LoadTable], duration: float) -> tuple[Segment, ...
 
 
 def values_before(parts: Sequence[Segment], times: Array) -> Array:
-    """Return the loads at given times, at a jump the values before it.
+    """Return the loads at given times: at a jump the values before it.
 
     Parameters
     ----------
     parts : the segments of a run.
-    times : (n,) s, at least 0; at 0 a load has the value after a jump.
+    times : (n,) s, not negative. At a jump at time 0 the value after it is returned.
 
     Returns
     -------
@@ -204,7 +210,7 @@ def values_before(parts: Sequence[Segment], times: Array) -> Array:
     """
     import numpy as np
 
-    # A time that is off a jump by rounding belongs to the segment before it.
+    # A time that is later than a jump only by rounding belongs to the segment before the jump.
     which = np.searchsorted([part.end for part in parts[:-1]], times * (1.0 - 1e-12))
     values = np.array([part.values for part in parts])[which]
     slopes = np.array([part.slopes for part in parts])[which]
@@ -219,9 +225,9 @@ class Interval:
     Attributes
     ----------
     start, end : s.
-    sample_intervals : how many intervals between samples it covers; 1 where it is a part of one.
-    ends_at_sample : whether a sample is at its end.
-    segment : the loads on it.
+    sample_intervals : number of sample intervals that it covers; 1 for a part of a sample interval.
+    ends_at_sample : whether its end is the time of a sample.
+    segment : the segment of which it is a part, with the loads.
     """
 
     start: float
@@ -232,14 +238,14 @@ class Interval:
 
 
 def intervals(parts: Sequence[Segment], samples: int, *, every_sample: bool) -> list[Interval]:
-    """Divide a run into intervals that an engine integrates in one go.
+    """Divide a run into intervals, each of which an engine integrates without a stop.
 
     Parameters
     ----------
     parts : the segments of the run.
     samples : number of equally spaced samples, both ends included.
-    every_sample : whether to stop at every sample; else only where a load has a kink, and at the
-        samples around a kink that lies between two of them.
+    every_sample : whether the engine stops at every sample. Otherwise it stops only at kinks and
+        jumps of a load, and at the samples before and after a kink that is between two samples.
 
     Returns
     -------
@@ -248,9 +254,9 @@ def intervals(parts: Sequence[Segment], samples: int, *, every_sample: bool) -> 
     duration = parts[-1].end
     spacing = duration / (samples - 1)
     times = [*(k * spacing for k in range(samples - 1)), duration]
-    # Places of the stops, counted in sample intervals: whole numbers at samples, others between.
+    # The place of a stop is its time in sample intervals: a whole number if it is at a sample.
     at_samples = set(range(samples)) if every_sample else {0, samples - 1}
-    between: dict[float, float] = {}  # time of a stop, by its place
+    between: dict[float, float] = {}  # time (s) of each stop between samples, by its place
     for part in parts[1:]:
         place = part.start / spacing
         nearest = round(place)
@@ -264,40 +270,41 @@ def intervals(parts: Sequence[Segment], samples: int, *, every_sample: bool) -> 
     for start, end in itertools.pairwise(sorted([*at_samples, *between])):
         t0 = between.get(start, times[math.floor(start)])
         t1 = between.get(end, times[math.floor(end)])
-        # By its middle: its ends are off those of the segment by rounding where a kink is taken
-        # to be on a sample.
+        # The segment is found by the middle of the interval. The ends may differ slightly from
+        # those of the segment, since a kink close to a sample counts as on the sample.
         segment = parts[bisect_right(segment_starts, 0.5 * (t0 + t1)) - 1]
         stops.append(Interval(t0, t1, max(1, round(end - start)), end not in between, segment))
     return stops
 
 
 def step_within(segment: Segment, step: float) -> float:
-    """Return the largest step (s) with which a segment has a row for each point of a polynomial.
+    """Return the largest step (s) with which a segment has at least POLYNOMIAL_ROWS rows.
 
-    Work is integrated through these rows; between two kinks of the loads that are a step or two
-    apart it would else be of second order.
+    The work is integrated by polynomials through these rows. Between two kinks that are only one or
+    two steps apart, it would otherwise be of second order.
 
     Parameters
     ----------
-    segment : the loads.
-    step : s, the largest step allowed elsewhere.
+    segment : the segment.
+    step : s, the largest step allowed in longer segments.
     """
     return min(step, (segment.end - segment.start) / (POLYNOMIAL_ROWS - 1))
 
 
 def steps_and_rows(span: float, step: float, rows_between: bool) -> tuple[int, int]:
-    """Return how many steps an interval takes, and how many rows of them are kept.
+    """Return the number of steps from one sample to the next, and how many are kept as rows.
 
     Parameters
     ----------
-    span : s, of the interval.
+    span : s, time between the samples, or between a sample and a kink that is nearer.
     step : s, the largest step allowed.
-    rows_between : whether rows are needed within the interval; else the one at its end is kept.
+    rows_between : whether rows are needed within the span. Otherwise only the row at its end is
+        kept.
 
     Returns
     -------
     steps, rows : int
-        The number of equal steps, and a divisor of it.
+        The number of equal steps, and the number of rows, which divides the number of steps.
     """
     steps = max(1, math.ceil(span / step * (1.0 - 1e-9)))
     if not rows_between:
