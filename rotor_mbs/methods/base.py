@@ -1,4 +1,7 @@
-"""Define a method: one object with everything the package knows of it, and ladders of settings."""
+"""Define the classes of methods, of their ladders of settings, and of the solvers they build.
+
+A `Method` object has everything that the package knows about the method.
+"""
 
 from __future__ import annotations
 
@@ -14,28 +17,30 @@ from typing import TYPE_CHECKING, Any, Protocol
 from rotor_mbs.errors import InputError, RotorError, shown_value
 from rotor_mbs.methods.settings import Settings as Settings
 
-if TYPE_CHECKING:  # reading the catalogue needs none of them
+if TYPE_CHECKING:  # reading the catalogue needs none of these modules
     from rotor_mbs.scenario.accuracy_bounds import Bound
     from rotor_mbs.scenario.scene import Scene
     from rotor_mbs.solution.trajectory import Integration, Linearization, RunBlock, Trajectory
 
 
 STEP, TOLERANCE = "step", "tolerance"
-MAX_STEPS = 1e9  # of a run; the engines count them in 32 bits
+MAX_STEPS = 1e9  # largest number of steps in a run; the engines count steps in 32 bits
 
 
 @dataclass(frozen=True)
 class Ladder:
-    """A curve of the work-precision diagram: a method over a falling step or tolerance.
+    """A series of steps or tolerances of a method, each finer than the one before.
+
+    `bench` draws each ladder as a curve of the work-precision diagram.
 
     Attributes
     ----------
     kind : STEP or TOLERANCE.
     values : steps as shares of the sample interval, or tolerances, from coarse to fine.
-    settings_at : (step in s, or tolerance) -> the settings that go with it.
+    settings_at : (step in s, or tolerance) -> settings with this step or tolerance.
     choices : settings that stay the same along the ladder.
-    variant : what follows the method's name in the name of the curve; "" for the default choices.
-    label : what follows the method's label in the label of the curve.
+    variant : text after the method's name in the name of the curve; "" for the default choices.
+    label : text after the method's label in the label of the curve.
     """
 
     kind: str
@@ -47,7 +52,7 @@ class Ladder:
 
     @property
     def coarse(self) -> Ladder:
-        """Return this ladder with every second value, without the coarsest third."""
+        """Return a shorter ladder: every second value, without the coarsest third."""
         return replace(self, values=self.values[len(self.values) // 3 :: 2])
 
     def settings_by_value(self, interval: float) -> dict[float, dict[str, object]]:
@@ -55,12 +60,13 @@ class Ladder:
 
         Parameters
         ----------
-        interval : s, between samples.
+        interval : s, time between samples.
 
         Returns
         -------
         dict
-            By step (s) or tolerance, from coarse to fine, all settings that the method is given.
+            Settings of each point by its step (s) or tolerance, from coarse to fine. A setting that
+            is missing has its default.
         """
         settings: dict[float, dict[str, object]] = {}
         for value in self.values:
@@ -76,7 +82,7 @@ def step_ladder(count: int, first: int = 0, **others: Any) -> Ladder:
     ----------
     count : number of steps.
     first : the first step is the sample interval times 0.5**first.
-    **others : other fields of the `Ladder`.
+    **others : values of further fields of the `Ladder`.
     """
     shares = tuple(0.5**k for k in range(first, first + count))
     return Ladder(STEP, shares, lambda step: {"step": step}, **others)
@@ -90,26 +96,26 @@ def tolerance_ladder(
 
     Parameters
     ----------
-    settings_at : (tolerance) -> the settings that go with it.
-    *tolerances : from coarse to fine.
+    settings_at : (tolerance) -> settings with this tolerance.
+    *tolerances : the tolerances, from coarse to fine.
     """
     return Ladder(TOLERANCE, tolerances, settings_at)
 
 
 def tolerance_pair(tolerance: float) -> Mapping[str, float]:
-    """Return the settings for a relative tolerance, with the absolute one that goes with it."""
-    # Angles and rates are of order one: the relative tolerance decides.
+    """Return settings with a relative tolerance, and an absolute tolerance of a hundredth of it."""
+    # Angles and rates are of order one, so the relative tolerance determines the accuracy.
     return {"relative_tolerance": tolerance, "absolute_tolerance": 0.01 * tolerance}
 
 
 @dataclass(frozen=True, slots=True)
 class BuiltItem:
-    """An item of which a model consists, as `show --build` lists it.
+    """An item of a model, as `show --build` lists it.
 
     Attributes
     ----------
     kind : node, object, marker, load, sensor, equation or term.
-    name : of the item.
+    name : name of the item.
     detail : further description.
     """
 
@@ -119,33 +125,33 @@ class BuiltItem:
 
 
 class Solver(Protocol):
-    """A model built for one scene with one integrator, which runs from the start repeatedly."""
+    """A model with an integrator, built for one scene; it can integrate the scene repeatedly."""
 
     def integrate(self) -> Integration:
-        """Run from the initial state to the end.
+        """Integrate from the initial state to the end.
 
-        Only this is timed; it does no work that is not integration.
+        The time of this call is the run time of the method. The call does no other work.
         """
 
     def observe(self) -> Trajectory:
-        """Return samples of the last integration, cut before the first row that is not finite."""
+        """Return the samples of the last integration before the first that is not finite."""
 
 
 def checked_result(value: Any, kind: type, name: str, function: object, method: str) -> Any:
-    """Return what a function of a method returned, if it is of the right type.
+    """Return a value that a function of a method has returned, after a check of its type.
 
     Parameters
     ----------
-    value : what it returned.
-    kind : the type that it must have.
-    name : what the function is called in this package, such as "observe".
-    function : the function; a class stands for its `__init__`.
-    method : the method's name, in the message where the function's place is not known.
+    value : the value.
+    kind : the type that the value must have.
+    name : name of the function in this package, such as "observe".
+    function : the function, or a class that is called like one.
+    method : name of the method; the message begins with it if the function's file is not known.
 
     Raises
     ------
     RotorError
-        In one line, with the file and line number of the function.
+        If the value is of another type. The message has the file and line number of the function.
     """
     if isinstance(value, kind):
         return value
@@ -164,7 +170,7 @@ def place_of(function: object, default: str) -> str:
 
 
 def method_fault(method: Method) -> str:
-    """Return which attribute of a method has a wrong type, and what is allowed; "" where none."""
+    """Return a message on the first attribute of a method that has a wrong type; "" if none has."""
     is_optional_number = method.order is None or _is_number(method.order)
     are_right = {
         "name": (isinstance(method.name, str), "text"),
@@ -205,13 +211,13 @@ def _are_all(values: object, kind: type) -> bool:
 
 
 def _are_bounds(values: object) -> bool:
-    from rotor_mbs.scenario.accuracy_bounds import Bound  # late: `list` reads no bounds
+    from rotor_mbs.scenario.accuracy_bounds import Bound  # late: the command `list` needs no bounds
 
     return _are_all(values, Bound)
 
 
 def no_items(_scene: Scene) -> list[BuiltItem]:
-    """Return no items, for methods that do not list them."""
+    """Return an empty list, for methods that do not list their items."""
     return []
 
 
@@ -225,31 +231,32 @@ class Method:
     label : name in tables and figures: "model, integrator".
     build : (scene, settings) -> Solver; settings is an instance of `settings`. Raises MethodRefusal
         if the method cannot represent the scene.
-    items : (scene) -> list of BuiltItem, the items of the model; raises MethodRefusal like `build`.
-    settings : class of its settings, with units, defaults and ranges.
+    items : (scene) -> list of BuiltItem, the items of the model. Raises MethodRefusal like `build`.
+    settings : class of the settings, with their units, defaults and ranges.
     is_corrected : whether it solves the corrected equations; if not, the accuracy of its runs is
         not assessed.
-    is_default : whether it is in the default selection.
-    erratum : "E1", "E2" or "E3" if it has this erratum of the printed equations only; else "".
-    distributions : names of the packages it needs.
-    fallback : name of the method that replaces it if these are not installed; "" for none.
+    is_default : whether the method is in the default selection.
+    erratum : "E1", "E2" or "E3" if its equations have only this erratum; otherwise "".
+    distributions : names of the packages that the method needs.
+    fallback : name of the method that replaces it if one of these packages is not installed; "" for
+        none.
     order : order of convergence; None if it is not fixed.
-    fixed_step : whether the step is the setting `step`.
+    fixed_step : whether the setting `step` is the step of the whole run.
     ladders : series of settings used by `bench`.
-    relative_cost : run time relative to the fastest method, roughly. Expensive methods are started
-        first.
+    relative_cost : approximate run time, divided by that of the fastest method. Expensive methods
+        are started first.
     bounds : accuracy bounds of a method of another package; those of built-in methods are in
         reference/accuracy.toml.
-    solve_many : (scenes, settings) -> RunBlock: several runs of a sweep at once, for the outputs
-        angles, rates, tip and energy only; or None.
-    linearize : (scene, steady angles, rotor speed, rotor torque) -> Linearization, or None; for one
-        method of each model. Raises MethodRefusal for a state about which the model cannot be
-        linearized.
-    arrays : names of optional quantities that it stores, such as "constraint_error".
-    sources : source files of a method of another package, or the text of a method file;
-        their digest is stored with each run.
-    import_engine : imports the packages that the method needs, and switches off caches of code that
-        earlier processes compiled; called before a timing.
+    solve_many : (scenes, settings) -> RunBlock, several runs of a sweep computed at once; or None.
+        It computes no outputs but angles, rates, tip and energy.
+    linearize : (scene, steady angles, rotor speed, rotor torque) -> Linearization; or None. One
+        method of each model has this function. It raises MethodRefusal for a state about which the
+        model cannot be linearized.
+    arrays : names of optional quantities that the method stores, such as "constraint_error".
+    sources : source files of a method of another package, or the text of a method file. A digest
+        of them is stored with each run.
+    import_engine : () -> None, called before a timing. It imports the packages that the method
+        needs. It also switches off caches of code that earlier processes have compiled.
     """
 
     name: str
@@ -285,27 +292,27 @@ class Method:
 
     @property
     def defaults(self) -> dict[str, object]:
-        """Return the default values of its settings."""
+        """Return the default values of the settings by name."""
         return self.settings().as_dict()
 
     @property
     def is_installed(self) -> bool:
-        """Return whether all packages that it needs are installed."""
+        """Return whether all packages that the method needs are installed."""
         return all(_is_distribution_installed(distribution) for distribution in self.distributions)
 
     def chosen(self, scene: Scene, given: Mapping[str, object]) -> Settings:
-        """Return the settings for a run.
+        """Return all settings for a run, from those that are given and the defaults.
 
         Parameters
         ----------
         scene : the scene to run.
-        given : values by name; the others have their defaults.
+        given : values of settings by name.
 
         Raises
         ------
         InputError
-            For an unknown name, an invalid value, and a step that is less than the scene's duration
-            divided by MAX_STEPS.
+            If a name is unknown, a value is invalid, or the step is less than the duration of the
+            scene divided by MAX_STEPS.
         """
         chosen = self.settings.of(self.name, given)
         if not self.fixed_step:
@@ -319,15 +326,18 @@ class Method:
         return chosen
 
     def finer(self, settings: Mapping[str, object], interval: float) -> dict[str, object]:
-        """Return the next finer settings of its ladder, {} at its end.
+        """Return settings of the next point on the method's ladder that is finer than a run.
+
+        Only the settings that have to be lowered are returned; none if there is no finer point.
 
         Parameters
         ----------
-        settings : all settings of a run of the method.
-        interval : s, between samples.
+        settings : all settings of the run.
+        interval : s, time between samples.
         """
         for ladder in self.ladders:
-            # A variant has other choices: its settings are not finer, but other ones.
+            # The ladder of a variant has other choices, so its settings are not those of the run,
+            # made finer.
             if ladder.variant:
                 continue
             for number in ladder.settings_by_value(interval):
@@ -335,10 +345,12 @@ class Method:
                 lower: dict[str, object] = {}
                 for name, value in finer.items():
                     current = settings[name]
-                    # Not by rounding alone: `next to try` prints values with three digits.
+                    # A value that is lower by less than 1 % is not finer: the run may have a value
+                    # that `next to try` has printed, rounded to three digits.
                     if isinstance(current, int | float) and value < 0.99 * current:
                         lower[name] = value
-                # The first setting is the step or the relative tolerance: it must be lower.
+                # The first setting is the step or the relative tolerance. If it is not lower, the
+                # point is not finer.
                 first_setting = next(iter(finer))
                 if first_setting in lower:
                     return lower
@@ -349,7 +361,7 @@ def _is_distribution_installed(distribution: str) -> bool:
     """Return whether a package is installed, without importing it."""
     module = distribution.replace("-", "_")
     if module in sys.modules:
-        return bool(sys.modules[module])  # None where its import is blocked
+        return bool(sys.modules[module])  # None if its import is blocked
     try:
         return find_spec(module) is not None or metadata.distribution(distribution) is not None
     except metadata.PackageNotFoundError:
@@ -357,5 +369,5 @@ def _is_distribution_installed(distribution: str) -> bool:
 
 
 def lazy(place: str) -> Callable[..., Any]:
-    """Return the function at "package.module:name", imported when it is first called."""
+    """Return a function that imports the one at "package.module:name" when it is called."""
     return lambda *arguments: resolve_name(place)(*arguments)

@@ -21,7 +21,7 @@ from rotor_mbs.solution.trajectory import (
     shape_fault,
 )
 
-_OBSERVING_S = 1.0  # s that are always left to take the samples, also after the time limit
+_OBSERVING_S = 1.0  # least time for taking the samples, s, even if the time limit is reached
 
 
 @caller_signals()
@@ -39,30 +39,31 @@ def solve(
     ----------
     method : the method, or its name.
     scene : the scene.
-    settings : those that differ from the method's defaults.
-    repeats : how often to integrate at most; the samples are those of the last time.
-    budget_s : s, of all integrations together. It does not limit the first one; a further one is
-        begun only if it is expected to end within the budget.
-    time_limit_s : s, of all integrations together, after which the running one is stopped.
+    settings : values by name of the settings that differ from the method's defaults.
+    repeats : largest number of integrations. The samples are those of the last one.
+    budget_s : s, for all integrations together. The first integration is not limited by it. A
+        further one is begun only if it is expected to end within the budget.
+    time_limit_s : s, for all integrations together. The integration that reaches it is stopped.
 
     Returns
     -------
     Solution
-        Not judged yet, without a status; its `integration` is the engine's report.
+        The run without a status, as it is not judged yet. Its `integration` is the engine's report.
 
     Raises
     ------
     InputError
-        For an unknown method or setting, or a value that is not allowed.
+        If the method or a setting is unknown, or a value is not allowed.
     MethodRefusal
         If the method cannot represent the scene.
     OutOfTimeError
-        If the method cannot keep the samples that it had reached at the time limit.
+        If the time limit is reached, and the method cannot return the samples up to then, or not
+        soon enough.
     RotorError
-        If the method returns objects of other types, or arrays of a wrong shape.
+        If the method returns objects of wrong types, or arrays of a wrong shape.
     Exception
-        One of SYSTEM_ERRORS if the system lacks memory, files or processes, or a library cannot be
-        loaded; otherwise what the method raises.
+        Any error that the method raises. It is one of SYSTEM_ERRORS if the system lacks memory,
+        files or processes, or a library cannot be loaded.
     """
     method = find_method(method) if isinstance(method, str) else method
     chosen = method.chosen(scene, settings)
@@ -72,7 +73,7 @@ def solve(
         setup_s = time.perf_counter() - start
 
         run_times: list[float] = []
-        # A collection of garbage within an integration would be timed with it.
+        # Python's garbage collection is off, as its time would count as time of the integration.
         gc_was_on = gc.isenabled()
         begin = time.monotonic()
         try:
@@ -83,7 +84,7 @@ def solve(
                     integration = solver.integrate()
                     run_times.append(time.perf_counter() - start)
                     _check_report(method, solver, integration)
-                    if integration.out_of_time:  # a further one would have no limit
+                    if integration.out_of_time:  # nothing would limit a further integration
                         break
         finally:
             if gc_was_on:
@@ -91,7 +92,8 @@ def solve(
 
         start = time.perf_counter()
         remaining_s = max(begin + time_limit_s - time.monotonic(), _OBSERVING_S)
-        # Samples of a diverging run overflow; the judgement finds what is not finite.
+        # Samples of a diverging run may overflow: no warning, as the judgement reports values that
+        # are not finite.
         with time_limit(remaining_s), np.errstate(over="ignore", invalid="ignore"):
             trajectory = solver.observe()
         checked_result(trajectory, Trajectory, "observe", solver.observe, method.name)
@@ -111,7 +113,7 @@ def solve(
 
 
 def _checked_solver(method: Method, solver: Solver) -> Solver:
-    """Return what a method's `build` returned. Raises RotorError if it is no solver."""
+    """Return the solver that a method's `build` returned. Raises RotorError if it is not one."""
     missing = [name for name in ("integrate", "observe") if not hasattr(solver, name)]
     if missing:
         place = place_of(method.build, method.name)
@@ -122,12 +124,15 @@ def _checked_solver(method: Method, solver: Solver) -> Solver:
 
 
 def _check_report(method: Method, solver: Solver, integration: Integration) -> None:
-    """Raise RotorError if what a solver reports of an integration is of a wrong type."""
+    """Raise RotorError if the report of an integration, or a field of it, is of a wrong type."""
     checked_result(integration, Integration, "integrate", solver.integrate, method.name)
     if fault := report_fault(integration):
         raise RotorError(f"{place_of(solver.integrate, method.name)}: {fault}")
 
 
 def _has_time(run_times: list[float], repeats: int, budget_s: float) -> bool:
-    """Return whether to integrate once more, expected to take as long as the last time."""
+    """Return whether to integrate again, as `repeats` and the budget allow it.
+
+    The next integration is expected to take as long as the last one.
+    """
     return len(run_times) < repeats and sum(run_times) + run_times[-1] < budget_s
