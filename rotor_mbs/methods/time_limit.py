@@ -1,17 +1,20 @@
 """Limit the time of runs, and keep the signal handlers of the caller while methods run.
 
-A limit ends a block by OutOfTimeError, or, inside `samples_kept_at_limit`, lets the code ask
-`is_over` between steps, where an exception would lose samples. In the main thread the exception
-comes from SIGALRM, so that it also ends code that never asks; in other threads, and on Windows, the
-code must ask.
+A time limit applies to a block of code and ends it by OutOfTimeError. In the main thread the
+handler of SIGALRM raises the exception, which also ends code that never asks for the time. In other
+threads, and on Windows, the code must call `raise_if_over` or `is_over`.
 
-Python has one handler for SIGALRM and one timer, ITIMER_REAL, and the caller may use both
-(pytest-timeout does). While a block is active, they are shared: the timer is set to whatever is due
-next, ours or the caller's, and the caller's handler is called when its own time has come. After the
-block, handler and timer are the caller's again.
+The exception would lose the samples computed so far. Code that keeps its samples runs in a block of
+`samples_kept_at_limit`, which prevents the exception, and calls `is_over` between steps.
 
-What a handler of the caller raises must reach the caller, although engines and our own code catch
-exceptions of methods, to store them as results: see `caller_signals`.
+A process has one handler for SIGALRM and one timer, ITIMER_REAL. The caller of this package may use
+both, as pytest-timeout does. While a block is active, this module shares them with the caller: it
+sets the timer to the next due time, of a limit or of the caller, and calls the caller's handler at
+the caller's time. After the block it gives both back.
+
+An exception that a signal handler of the caller raises must reach the caller. But engines catch
+exceptions, and so does our own code, which stores those of methods as results. `caller_signals`
+passes the exceptions of handlers on nevertheless.
 """
 
 from __future__ import annotations
@@ -28,26 +31,26 @@ from typing import Any
 
 from rotor_mbs.errors import InputError, shown_value
 
-MESSAGE = "stopped at the time limit"  # of a run that was
-_MAX_LIMIT_S = 1e9  # the system's timers take no more than the seconds of its clock
-_SHORTEST_S = 1e-6  # 0 would switch the timer off
-_SOON_S = 1e-4  # until an alarm that came at a wrong moment comes again
-# an alarm is for what is due until then: clock and timer need not agree to the last digit
+MESSAGE = "stopped at the time limit"  # message of a run that reached its limit
+_MAX_LIMIT_S = 1e9  # longer limits count as none: the system's timers do not take them
+_SHORTEST_S = 1e-6  # shortest time to which the timer is set; 0 would switch it off
+_SOON_S = 1e-4  # delay after which an alarm that cannot be handled now comes again
+# A time counts as due up to this many seconds early, as the clock and the timer differ slightly.
 _EARLY_S = 1e-3
 
 
 class OutOfTimeError(Exception):
-    """A run is over its time limit."""
+    """Raised if a run has exceeded its time limit."""
 
 
 def valid_seconds(timeout: float) -> float:
-    """Return a valid time limit in s; infinity means none.
+    """Return a time limit in s as a float, after a check; infinity means no limit.
 
-    Raises InputError unless it is above 0, TypeError if it is no number.
+    Raises InputError if the limit is not above 0, and TypeError if it is not a number.
     """
     try:
-        seconds = math.fsum([timeout])  # as float(timeout), but not of text
-    except OverflowError:  # a whole number above 1e308
+        seconds = math.fsum([timeout])  # like float(timeout), but raises TypeError for text
+    except OverflowError:  # for a whole number above 1e308
         seconds = math.nan
     if not seconds > 0.0:
         raise InputError(f"timeout: {shown_value(timeout)}; allowed: seconds, more than 0")
@@ -55,19 +58,19 @@ def valid_seconds(timeout: float) -> float:
 
 
 def time_limit(seconds: float) -> AbstractContextManager[object]:
-    """Raise OutOfTimeError in the block after `seconds`; infinity means never.
+    """Return a context manager that raises OutOfTimeError in its block after `seconds`.
 
-    Inside `samples_kept_at_limit` it is not raised. Limits may be nested: one that ends while an
-    inner one is active ends the inner block, too.
+    Infinity means no limit. Inside `samples_kept_at_limit` the error is not raised. Limits may be
+    nested: a limit that is reached while the block of an inner limit runs ends this block, too.
     """
     return nullcontext() if seconds > _MAX_LIMIT_S else _Limit(seconds)
 
 
 @contextmanager
 def samples_kept_at_limit() -> Iterator[None]:
-    """Raise no OutOfTimeError in the block.
+    """Prevent that a limit raises OutOfTimeError in the block.
 
-    Its code calls `is_over` itself, and keeps the samples that it has computed.
+    The code in the block calls `is_over` instead, and keeps the samples computed so far.
     """
     stack = _limits.stack
     if not stack:
@@ -82,9 +85,9 @@ def samples_kept_at_limit() -> Iterator[None]:
 
 
 def is_over() -> bool:
-    """Return whether a limit is reached.
+    """Return whether a time limit of this thread is reached.
 
-    Once this has returned True, a late signal does not interrupt the innermost block.
+    After it has returned True, a late alarm does not interrupt the innermost block any more.
     """
     stack = _limits.stack
     if not stack:
@@ -95,19 +98,20 @@ def is_over() -> bool:
 
 
 def raise_if_over() -> None:
-    """Raise OutOfTimeError if a limit is reached.
+    """Raise OutOfTimeError if a time limit of this thread is reached.
 
-    It is called between parts of long work, for threads that the signal does not reach.
+    Long computations call this function between their parts. It is needed in threads that the
+    alarm does not reach.
     """
     if is_over():
         raise OutOfTimeError(MESSAGE)
 
 
 def step_callback() -> Callable[[object], bool] | None:
-    """Return a function for an engine to call after every step, which returns whether to go on.
+    """Return a function that an engine calls after every step to learn whether to go on.
 
-    It is None if no alarm can come, neither of a limit nor of the caller: the call takes time, and
-    Python handles signals in it. For use inside `samples_kept_at_limit`.
+    Python handles signals during the call. But each call takes time: if no alarm can come, neither
+    of a limit nor of the caller, None is returned. The engine runs in `samples_kept_at_limit`.
     """
     has_alarm = bool(_limits.stack)
     if not has_alarm and _handles_signals() and hasattr(signal, "getitimer"):
@@ -116,9 +120,9 @@ def step_callback() -> Callable[[object], bool] | None:
 
 
 def must_ask() -> bool:
-    """Return whether a limit is active that cannot interrupt code.
+    """Return whether a limit is active that cannot interrupt code, so that the code must ask.
 
-    This is so in a thread, or without SIGALRM.
+    No limit can interrupt code outside the main thread, or on a system without SIGALRM.
     """
     return bool(_limits.stack) and not (_handles_signals() and _signals.has_alarm)
 
@@ -131,9 +135,9 @@ def _handles_signals() -> bool:
 
 
 class _Limits(threading.local):
-    """The limits of each thread, the innermost last.
+    """The active limits of a thread, with the innermost one last.
 
-    The limits of one thread do not affect those of another.
+    Each thread has its own limits, which do not affect other threads.
     """
 
     def __init__(self) -> None:
@@ -141,21 +145,23 @@ class _Limits(threading.local):
 
 
 class _Limit:
-    """The context of `time_limit`.
+    """The context manager that `time_limit` returns.
 
-    A class, because its methods are known to the handler of the alarm, which lets them finish: an
-    exception inside a `contextmanager`'s own code, before or after the block, would leave the limit
-    behind.
+    It is a class because the handler of the alarm can then recognize its methods (`_OURS`) and let
+    them finish. With `contextmanager`, an exception in the code before or after `yield` would leave
+    the limit active.
     """
 
     def __init__(self, seconds: float) -> None:
         self._seconds = seconds
-        # on the monotonic clock; `until`: of the limits around it, too
+        # Times on the monotonic clock: `end` of this limit, `until` the earliest end of this limit
+        # and the limits around it.
         self.end = self.until = math.inf
-        self.is_polled = False
-        self.is_known = False  # to the code in the block, which is not interrupted any more
-        self.has_fired = False
-        self.frame: FrameType | None = None  # that has the block
+        self.is_polled = False  # whether the code in the block calls `is_over` itself
+        # Whether the code in the block knows that it is over its limit, and is not interrupted.
+        self.is_known = False
+        self.has_fired = False  # whether the alarm of this limit has been handled
+        self.frame: FrameType | None = None  # frame of the function that has the block
 
     def __enter__(self) -> None:
         stack = _limits.stack
@@ -173,7 +179,9 @@ class _Limit:
         stack = _limits.stack
         del stack[stack.index(self) :]
         self.frame = None
-        for limit in stack:  # those around it end their own blocks, which are interrupted again
+        # A limit around this one may have ended this block. It now has to end its own block by
+        # another alarm, unless the code there knows that it is over its limit.
+        for limit in stack:
             limit.has_fired = limit.is_known
         if _handles_signals():
             if stack:
@@ -190,9 +198,10 @@ _limits = _Limits()
 
 
 class _HandlerError(BaseException):
-    """Exception that carries one of a caller's handler past every `except Exception`.
+    """Carry an exception of the caller's signal handler past every `except Exception`.
 
-    The exception that it carries is raised at the end of `caller_signals`.
+    Such a clause does not catch this class, which is not a subclass of Exception. The exception
+    that it carries is raised at the end of the block of `caller_signals`.
     """
 
     def __init__(self, error: BaseException) -> None:
@@ -201,13 +210,15 @@ class _HandlerError(BaseException):
 
 
 class caller_signals(ContextDecorator):  # noqa: N801  (a context manager, as `contextlib.suppress`)
-    """Let exceptions of the caller's signal handlers through, whatever catches them in the block.
+    """Pass exceptions of the caller's signal handlers on, even if code in the block catches them.
 
-    Exudyn turns an exception that a handler raises during its run into one of its own, and our own
-    code stores what a method raises as its result. So handlers are wrapped: what they raise is
-    noted, passes every `except Exception`, and is raised at the end of the block where something
-    has caught it nevertheless. In the main thread; in others, where Python runs no handlers,
-    nothing is done.
+    Exudyn replaces an exception that a handler raises during a run by one of its own, and our own
+    code stores an exception of a method as the result of the run. Therefore our handlers replace
+    the caller's and call them. An exception that a handler of the caller raises is stored, and is
+    raised in a form that `except Exception` does not catch. If other code catches it nevertheless,
+    it is raised again at the end of the block.
+
+    All this happens in the main thread only: Python runs no signal handlers in other threads.
     """
 
     def __enter__(self) -> None:
@@ -220,28 +231,30 @@ class caller_signals(ContextDecorator):  # noqa: N801  (a context manager, as `c
 
 
 class _Signals:
-    """The signal handlers and the timer of the caller, while ours replace them.
+    """The caller's signal handlers and timer while ours replace them.
 
-    Only the main thread uses it.
+    Only the main thread uses this class.
     """
 
     def __init__(self) -> None:
-        self._depth = 0  # of blocks, while there are handlers
-        self._handlers: dict[int, Any] = {}  # of the caller, by signal
-        self._raised: BaseException | None = None  # by one of them, since the outermost block began
-        self._shares_timer = False  # whether it is set by `arm`; else it is the caller's
-        self._is_giving_back = False
-        # of the caller's timer, on the monotonic clock; s, where it repeats
+        self._depth = 0  # number of nested blocks
+        self._handlers: dict[int, Any] = {}  # the caller's handlers by signal; empty outside blocks
+        # The last exception that one of them has raised since the outermost block began.
+        self._raised: BaseException | None = None
+        self._shares_timer = False  # whether `arm` sets the timer; otherwise the caller does
+        self._is_giving_back = False  # whether the timer is just being set to the caller's time
+        # Next due time of the caller's timer on the monotonic clock, and its period in s; a period
+        # of 0 means that the timer does not repeat.
         self._due, self._interval = math.inf, 0.0
-        self._is_missed = False  # whether an alarm of the caller came where it had to wait
-        # whether Python ignored what was raised, so that it is raised once more
+        self._is_missed = False  # whether an alarm of the caller had to wait
+        # Whether Python ignored the exception in `_raised`. It then has to be raised once more.
         self._is_lost = False
-        # the caller's
+        # The caller's `sys.unraisablehook`.
         self._hook: Callable[[sys.UnraisableHookArgs], object] = sys.__unraisablehook__
 
     def enter(self) -> None:
-        """Begin a block; the outermost one replaces the caller's handlers by ours."""
-        if self._handlers:  # ours are in place
+        """Begin a block; the outermost block replaces the caller's handlers by ours."""
+        if self._handlers:  # our handlers are in place
             self._depth += 1
             return
         self._raised, self._is_missed, self._is_lost = None, False, False
@@ -250,7 +263,7 @@ class _Signals:
                 self._hook, sys.unraisablehook = sys.unraisablehook, _on_unraisable
             for number in _SIGNALS:
                 handler = signal.getsignal(number)
-                # one that is not Python's could not be set again
+                # A handler that was not set by Python is None here: it could not be set again.
                 if number == _ALARM and handler is not None:
                     self._handlers[number] = handler
                     signal.signal(number, _on_alarm)
@@ -263,11 +276,11 @@ class _Signals:
             raise
 
     def leave(self, error: BaseException | None) -> None:
-        """End a block; raise the exception that a handler of the caller has raised in it.
+        """End a block, and raise the exception that a handler of the caller has raised in it.
 
         Parameters
         ----------
-        error : with which the block ends, or None.
+        error : the exception with which the block ends, or None.
         """
         if self._depth > 1:
             self._depth -= 1
@@ -283,7 +296,7 @@ class _Signals:
             try:
                 raise raised
             finally:
-                raised.__context__ = context  # without what happened to it in between
+                raised.__context__ = context  # as the handler raised it
 
     def _restore_handlers(self) -> None:
         try:
@@ -293,7 +306,7 @@ class _Signals:
             for number, handler in list(self._handlers.items()):
                 signal.signal(number, handler)
                 del self._handlers[number]
-        except BaseException:  # of a handler that is already the caller's again
+        except BaseException:  # raised by a handler of the caller that is in place again
             self._restore_handlers()
             raise
 
@@ -301,16 +314,17 @@ class _Signals:
 
     @property
     def has_alarm(self) -> bool:
-        """Return whether SIGALRM exists, and its handler can be set again."""
+        """Return whether SIGALRM exists and a block has replaced its handler."""
         return _ALARM in self._handlers
 
     def share_timer(self) -> None:
-        """Set the timer for the limits, too; how long the caller's still has to run is noted."""
+        """Store the caller's due time, and set the timer to the next due time of all."""
         if not self.has_alarm:
             return
         if not self._shares_timer:
             remaining, self._interval = signal.getitimer(signal.ITIMER_REAL)
-            # inside, an alarm that was on its way is handled, as the caller's
+            # During this call Python handles an alarm that has already arrived. The timer was the
+            # caller's, so that the alarm counts as the caller's.
             signal.signal(_ALARM, _on_alarm)
             self._shares_timer = True
             now = time.monotonic()
@@ -320,7 +334,7 @@ class _Signals:
         self.arm()
 
     def arm(self) -> None:
-        """Set the timer to the next due time: of the caller's alarm or of a limit."""
+        """Set the timer to the next due time of the caller or of a limit."""
         if not self._shares_timer:
             return
         now = time.monotonic()
@@ -333,19 +347,20 @@ class _Signals:
         )
 
     def give_timer_back(self, handler: Any = None) -> None:
-        """Set the timer to what is left of the caller's time.
+        """Set the timer to the rest of the time after which the caller's alarm is due.
 
-        An alarm that came due meanwhile comes at once.
+        If the caller's alarm is due already, the timer is set to come at once.
 
         Parameters
         ----------
-        handler : replaces ours before the timer is set.
+        handler : handler of SIGALRM that is installed before the timer is set; None for ours.
         """
         if not self._shares_timer:
             return
         self._is_giving_back = True
         signal.setitimer(signal.ITIMER_REAL, 0.0)
-        # Inside, an alarm of ours that was on its way is handled, while it is still known as ours.
+        # During this call Python handles an alarm that has already arrived. `on_alarm` ignores it,
+        # as `_is_giving_back` is set.
         signal.signal(_ALARM, handler or _on_alarm)
         self._shares_timer = self._is_giving_back = False
         if not math.isinf(self._due):
@@ -355,13 +370,13 @@ class _Signals:
     def on_alarm(self, frame: FrameType | None) -> None:
         """Raise OutOfTimeError or call the caller's handler, whichever is due.
 
-        This is delayed if the code that was interrupted must finish first.
+        If the interrupted code must finish first, the alarm is set to come again soon.
 
         Parameters
         ----------
-        frame : that was interrupted.
+        frame : the frame that was interrupted.
         """
-        if self._is_giving_back:  # the caller's, if it is due, is set to come at once
+        if self._is_giving_back:  # if the caller's alarm is due, the timer is set to come at once
             return
         if _is_in(frame, None, _is_ours):
             interval = 0.0
@@ -402,13 +417,13 @@ class _Signals:
         self.arm()
 
     def _call_alarm_handler(self, frame: FrameType | None) -> None:
-        """Call the caller's handler of the alarm as if ours were not installed.
+        """Call the caller's handler of SIGALRM, with the caller's handler and timer in place.
 
-        It may set the timer and the handler.
+        The caller's handler may set both; its settings are kept.
 
         Parameters
         ----------
-        frame : that was interrupted.
+        frame : the frame that was interrupted.
         """
         handler, shared = self._handlers[_ALARM], self._shares_timer
         if handler == signal.SIG_IGN:
@@ -420,7 +435,7 @@ class _Signals:
         try:
             if callable(handler):
                 self.call_handler(_ALARM, frame)
-            else:  # the system's: it ends the process
+            else:  # the system's default handler, which ends the process
                 signal.raise_signal(_ALARM)
         finally:
             changed = signal.getsignal(_ALARM)
@@ -430,21 +445,24 @@ class _Signals:
                 self.share_timer()
 
     def call_handler(self, number: int, frame: FrameType | None) -> None:
-        """Call the caller's handler of a signal, and keep what it raises."""
+        """Call the caller's handler of a signal; store and pass on an exception that it raises."""
         try:
             self._handlers[number](number, frame)
         except BaseException as error:
             self._raised = error
             if _is_in(frame, None, _is_ours):
-                return  # it is raised at the end of the block
+                return  # `leave` raises the exception
             raise _passing(error) from None
 
     def on_unraisable(self, unraisable: sys.UnraisableHookArgs) -> None:
-        """Raise an error of ours again that Python ignored, as in a weak reference's callback.
+        """Set the timer to raise an error again that this module has raised and Python has ignored.
+
+        Python ignores errors in the callback of a weak reference, for example. Errors that this
+        module has not raised are passed to the caller's `sys.unraisablehook`.
 
         Parameters
         ----------
-        unraisable : the arguments of `sys.unraisablehook`; other errors go to the former hook.
+        unraisable : argument of `sys.unraisablehook`.
         """
         error = unraisable.exc_value
         if isinstance(error, _HandlerError):
@@ -461,15 +479,15 @@ class _Signals:
 
 
 def _passing(error: BaseException) -> BaseException:
-    """Return an exception in a form that `except Exception` and our own code do not catch.
+    """Return an exception in a form that neither `except Exception` nor our own code catches.
 
-    One that these do not catch anyway is returned unchanged.
+    Exceptions that are not caught anyway are returned unchanged.
     """
     return _HandlerError(error) if isinstance(error, Exception | SystemExit) else error
 
 
 _signals = _Signals()
-_ALARM: int = getattr(signal, "SIGALRM", 0)  # 0 is no signal: on Windows
+_ALARM: int = getattr(signal, "SIGALRM", 0)  # 0, the number of no signal, on Windows
 _SIGNALS = tuple(signal.valid_signals())
 
 
@@ -502,9 +520,9 @@ _OURS = {
 def _is_in(
     frame: FrameType | None, outer: FrameType | None, is_sought: Callable[[CodeType], bool]
 ) -> bool:
-    """Return whether a function in the stack of frames is sought.
+    """Return whether `is_sought` is true for the code of a frame on the stack.
 
-    The stack begins at the innermost `frame` and ends before `outer`.
+    The frames from the innermost one, `frame`, up to `outer`, which is excluded, are searched.
     """
     while frame is not None and frame is not outer:
         if is_sought(frame.f_code):
@@ -514,18 +532,18 @@ def _is_in(
 
 
 def _is_ours(code: CodeType) -> bool:
-    """Return whether a function begins or ends a block, or handles a signal.
+    """Return whether code begins or ends a block of this module, or handles a signal.
 
-    It must not be interrupted halfway.
+    Such code must not be interrupted halfway.
     """
     return code in _OURS
 
 
 def _must_finish(code: CodeType) -> bool:
-    """Return whether a limit waits for a function: what it would leave half stays in the process.
+    """Return whether a limit must not interrupt a function, as this would damage the process.
 
-    A compiled module whose import was broken off cannot be imported again, and a context that is
-    not left, as that of NumPy's floating-point errors, stays for what comes after.
+    A compiled module cannot be imported again after an interrupted import. A context that is not
+    left properly, such as NumPy's handling of floating-point errors, also affects later code.
     """
     return code.co_name in ("__enter__", "__exit__", "__del__") or code.co_filename.startswith(
         "<frozen importlib"
