@@ -1,7 +1,7 @@
-"""Load methods that a Python file defines, named by its path: `-m ./mine.py` has `mine/...`.
+"""Load the methods that a Python file defines: `-m ./mine.py` loads the methods `mine/...`.
 
-The file's text is read once and goes with every task to its worker process, which needs no file and
-computes what this process has read.
+The file is read once. Its text is sent with every task to the worker process, which does not need
+the file. All tasks are therefore computed by the same code, even if the file changes meanwhile.
 """
 
 from __future__ import annotations
@@ -36,13 +36,13 @@ if TYPE_CHECKING:
     from rotor_mbs.scenario.scene import Scene
 
 ENDING = ".py"
-_LOAD_S = 300.0  # large engines load in seconds, on a busy machine in minutes
+_LOAD_S = 300.0  # time limit, s; large engines load in seconds, on a busy machine in minutes
 _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*")
 _TOLERANCES = (
     "tolerance",
     "relative_tolerance",
     "accuracy",
-)  # settings that make a ladder where there is no step
+)  # names of settings; a method without a setting `step` gets a ladder of the first that it has
 
 
 @dataclass(frozen=True)
@@ -51,30 +51,33 @@ class MethodFile:
 
     Attributes
     ----------
-    path : as it is given.
-    text : its content.
+    path : path of the file, as the user has given it.
+    text : content of the file.
     """
 
-    path: str  # as it is given
+    path: str
     text: str
 
     @property
     def model(self) -> str:
-        """Return the model in the names of its methods: "mine" for "folder/mine.py"."""
+        """Return the model's part of the methods' names: "mine" for "folder/mine.py"."""
         return Path(self.path).stem
 
     def load(self, built_in: Iterable[Method]) -> dict[str, Method]:
-        """Return its methods by name: "mine/rk4", also where the file calls it "rk4".
+        """Return the methods of the file by name.
+
+        The name is "mine/rk4", also if the file calls the method "rk4" or "other/rk4".
 
         Parameters
         ----------
-        built_in : methods that are none of the file's, also where it imports them.
+        built_in : methods of the catalogue that are of no file. They are not returned even if the
+            file imports them.
 
         Raises
         ------
         InputError
-            A line with file and line number for whatever the file raises, and where it has no
-            method or a name that is not allowed.
+            If the file raises an error; the message then has the file and the line number. Also if
+            the file defines no method, or a name or an attribute of a method is not allowed.
         """
         built_in = list(built_in)
         if not _NAME.fullmatch(self.model):
@@ -104,16 +107,16 @@ class MethodFile:
         return methods
 
     def execute(self) -> ModuleType:
-        """Run the file's text and return its module. Raises InputError."""
+        """Run the file's text and return its module. Raises InputError if the text fails."""
         module = ModuleType(f"rotor_mbs_method_file_{self.model}")
         module.__file__ = self.path
-        sys.modules[module.__name__] = module  # dataclasses look there
+        sys.modules[module.__name__] = module  # dataclasses look the module up there
         with self.located(), _without_folder(self.path), _loading, quiet():
             exec(compile(self.text, self.path, "exec", dont_inherit=True), vars(module))
         return module
 
     def defined(self, module: ModuleType) -> list[Method]:
-        """Return the methods that its module has, also in lists, each once."""
+        """Return the methods among the variables of a module and in its lists, each once."""
         methods: dict[Method, None] = {}
         for value in vars(module).values():
             for item in value if isinstance(value, list | tuple) else [value]:
@@ -122,13 +125,13 @@ class MethodFile:
         return list(methods)
 
     def name_of(self, method: Method) -> str:
-        """Return the name of a method under the file's name."""
+        """Return the name of a method of the file, with the file's name as model."""
         return f"{self.model}/{method.name.rpartition('/')[2]}"
 
     def _named(self, method: Method) -> Method:
-        """Return a method with the file's name as model.
+        """Return a copy of a method of the file, with the file's name as model.
 
-        It gets a ladder if it has none but a step or a tolerance.
+        If the method has no ladder, but a step or a tolerance as setting, the copy gets a ladder.
 
         Parameters
         ----------
@@ -156,10 +159,10 @@ class MethodFile:
         )
 
     def _items(self, method: Method, scene: Scene) -> list[BuiltItem]:
-        """Return the items that a method builds, or refuse what it cannot represent.
+        """Return the items of a method; raise MethodRefusal if it cannot represent the scene.
 
-        A method that does not list its items is built to see whether it refuses the scene. This is
-        done in another process, as code of others may end or hang it.
+        A method that does not list its items is built only to see whether it refuses the scene.
+        The code of the method runs in another process, which it may end or hang.
         """
         name = self.name_of(method)
         late = f"{name}: not built for {scene.name} within {_LOAD_S:g} s"
@@ -168,7 +171,7 @@ class MethodFile:
         return items
 
     def build_items(self, method: Method, scene: Scene) -> list[BuiltItem]:
-        """Return the items that a method builds, in this process; see `_items`."""
+        """Return the items of a method, whose code runs in this process; see `_items`."""
         with self.located():
             if method.items is not no_items:
                 items = method.items(scene)
@@ -181,25 +184,26 @@ class MethodFile:
 
     @contextmanager
     def located(self) -> Iterator[None]:
-        """Raise an error of the block as an InputError with file and line number.
+        """Raise an InputError with file and line number in place of an error in the block.
 
-        Errors that this package raises on purpose are passed on.
+        Errors of the class RotorError, which this package raises on purpose, are passed on.
         """
         try:
             yield
         except RotorError:
             raise
-        except (Exception, SystemExit) as exc:  # code of others may raise any type
+        except (Exception, SystemExit) as exc:  # other people's code may raise any error
             raise InputError(located(exc, [self.path])) from exc
 
 
 def located(error: BaseException, paths: Iterable[str]) -> str:
-    """Return an error in one line.
+    """Return an error as one line of text.
 
     Parameters
     ----------
     error : the error.
-    paths : files; the line has the file and line number if the error was raised in one of them.
+    paths : paths of files. If code of one of them raised the error, or called the code that raised
+        it, the line begins with the file and the line number.
     """
     paths = list(paths)
     if isinstance(error, SyntaxError) and error.filename in paths:
@@ -215,16 +219,16 @@ def located(error: BaseException, paths: Iterable[str]) -> str:
 
 
 def read_file(path: str) -> MethodFile:
-    """Read a Python file, and run it in another process.
+    """Read a Python file, and test it by running it in another process.
 
     Parameters
     ----------
-    path : of the file.
+    path : path of the file.
 
     Raises
     ------
     InputError
-        If the file cannot be read, raises an error, or ends or hangs the process that loads it.
+        If the file cannot be read, raises an error, or ends or hangs the process that runs it.
     """
     try:
         file = MethodFile(path, Path(path).read_text(encoding="utf-8"))
@@ -241,26 +245,28 @@ def read_file(path: str) -> MethodFile:
     return file
 
 
-# where files are loaded by several threads, their output is restored in order
+# Only one thread at a time runs a file, because `quiet` redirects the output of the whole process.
 _loading = threading.Lock()
-_worker = Worker(is_silent=True)  # that loads files; code of others may end or hang it
+_worker = Worker(is_silent=True)  # process in which files are tested; they may end or hang it
 atexit.register(_worker.close)
 
 
 def _ask(file: MethodFile, built: tuple[str, Scene] | None, late: str, ended: str) -> Any:
-    """Load a file in another process, and return what a method of it builds there.
+    """Load a file in another process, and return the items that one of its methods has there.
 
     Parameters
     ----------
     file : the file to load.
-    built : a method of it, by the name that the file gives it, and the scene for which it is built;
-        None to load alone.
-    late, ended : messages if it takes too long, and if it ends its process.
+    built : name of a method, as the file has it, and the scene for which the method is built. None
+        if the file is only to be loaded; None is then returned.
+    late, ended : messages of the errors if this takes too long, and if the process ends.
 
     Raises
     ------
-    MethodRefusal, InputError
-        As the file and its method do, and for a file that is late or ends the process.
+    MethodRefusal
+        If the method cannot represent the scene.
+    InputError
+        If the file or the method raises an error, takes too long, or ends the process.
     ResourceError
         If the process cannot be started.
     """
@@ -270,8 +276,8 @@ def _ask(file: MethodFile, built: tuple[str, Scene] | None, late: str, ended: st
         except InputError:
             if built is not None:
                 raise
-        # The process has the modules that the file imports, and the import path, as they were: a
-        # new one sees what was corrected since.
+        # The process may have loaded modules that the file imports before the user corrected them,
+        # or have an old import path. A new process has neither.
         _worker.end_process()
         return _worker.run(_answer, (file, built), _LOAD_S)
     except TaskLostError as exc:
@@ -280,13 +286,13 @@ def _ask(file: MethodFile, built: tuple[str, Scene] | None, late: str, ended: st
         raise InputError(f"{ended} (exit code {exc.exit_code})") from None
 
 
-_executed: dict[MethodFile, ModuleType] = {}  # in the other process
+_executed: dict[MethodFile, ModuleType] = {}  # modules of the files that the other process has run
 
 
 def _answer(question: tuple[MethodFile, tuple[str, Scene] | None]) -> Any:
-    """Run a file, and build the method in the question, in the other process; see `_ask`.
+    """Run a file and return the items of one of its methods; called by `_ask` in the other process.
 
-    A file that was run without an error is not run again.
+    A file that has run without an error is not run again.
     """
     file, built = question
     if file not in _executed:
@@ -302,7 +308,7 @@ def _answer(question: tuple[MethodFile, tuple[str, Scene] | None]) -> Any:
 def _without_folder(path: str) -> Iterator[None]:
     """Remove the folder of a file from the import path in the block.
 
-    In a file drake.py, `import drake` then imports the package, not the file itself.
+    In a file drake.py, `import drake` then imports the package drake, not the file itself.
     """
     before, folder = list(sys.path), Path(path).resolve().parent
     sys.path[:] = [place for place in before if Path(place).resolve() != folder]
@@ -325,7 +331,7 @@ def quiet() -> Iterator[None]:
     ):
         kept: dict[int, int] = {}
         for number in (1, 2):
-            with suppress(OSError):  # closed
+            with suppress(OSError):  # the stream is closed
                 kept[number] = os.dup(number)
                 os.dup2(nowhere.fileno(), number)
         try:
