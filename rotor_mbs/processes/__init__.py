@@ -2,7 +2,7 @@
 
 import os
 
-MAX_WORKERS = 1024  # processes
+MAX_WORKERS = 1024  # largest number of worker processes
 
 
 def cores() -> int:
@@ -13,8 +13,8 @@ def cores() -> int:
 
 
 def last_core() -> int | None:
-    """Return the core to time on, None where that is not known.
+    """Return the number of the core on which timings run; None if the system does not name cores.
 
-    It is the last allowed one, as the first serves most interrupts.
+    It is the last core that this process may use, as the first one handles most interrupts.
     """
     return max(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else None

@@ -1,6 +1,6 @@
 """Run tasks on a dask cluster, which needs no shared disk.
 
-The only module that imports dask (an extra, and slow to load).
+This is the only module that imports dask, which is an optional package and slow to load.
 """
 
 from __future__ import annotations
@@ -21,18 +21,19 @@ _CONNECT_S = 3.0
 
 
 def open_cluster(address: str, check: Callable[[], object]) -> Cluster:
-    """Connect to a dask scheduler.
+    """Connect to a dask scheduler, and return its cluster as an open pool.
 
     Parameters
     ----------
     address : "tcp://host:port".
-    check : called in every worker, now and before each task; raises InputError for a worker that
-        must not be used.
+    check : function that is called in every worker now, and before each task. It raises InputError
+        in a worker that must not be used.
 
     Raises
     ------
     InputError
-        If dask is not installed, no scheduler answers there, or it has no worker that can be used.
+        If dask is not installed, no scheduler answers at the address, the scheduler has no workers,
+        or one of its workers must not be used.
     """
     import asyncio
 
@@ -43,13 +44,13 @@ def open_cluster(address: str, check: Callable[[], object]) -> Cluster:
     except ImportError as exc:
         message = "engine dask: dask is not installed; pip install distributed"
         raise InputError(message) from exc
-    # What it logs of a lost connection is said here in a line.
+    # The logs of dask on a lost connection are dropped: this module raises an error of one line.
     for logger in list(logging.root.manager.loggerDict):
         if logger.startswith(("distributed", "tornado")):
             logging.getLogger(logger).setLevel(logging.CRITICAL + 1)
-    try:  # a client would wait for the answer of another program without end
+    try:  # if another program answers at the address, a client would wait for it without end
         asyncio.run(asyncio.wait_for(connect(address), _CONNECT_S)).abort()
-    except Exception as exc:  # whatever answers there
+    except Exception as exc:  # any error, as any program may answer
         allowed = "local, or the address of a scheduler"
         message = f"{engine}: no dask scheduler answers there; allowed: {allowed}"
         raise InputError(message) from exc
@@ -59,7 +60,7 @@ def open_cluster(address: str, check: Callable[[], object]) -> Cluster:
             client.run(check)
         except InputError:
             raise
-        except Exception as exc:  # of a worker that has no such function
+        except Exception as exc:  # a worker does not have the function `check`
             allowed = "workers with the code of this process"
             message = f"{engine}: a worker has other code ({one_line(exc)}); allowed: {allowed}"
             raise InputError(message) from exc
@@ -71,15 +72,15 @@ def open_cluster(address: str, check: Callable[[], object]) -> Cluster:
 
 
 class Cluster(TaskPool):
-    """The workers of a dask client.
+    """The workers of a dask client, as a pool.
 
-    A scheduler that is lost, or has no worker for `patience_s`, is a StoreError.
+    StoreError is raised if the scheduler is lost, or has no worker for longer than `patience_s`.
 
     Parameters
     ----------
-    client : a dask client; closed with the pool.
-    check : called in a worker before each task.
-    patience_s : time in s that may pass without a worker.
+    client : a dask client, which is closed with the pool.
+    check : function that is called in a worker before each task.
+    patience_s : s, longest time without a worker.
     """
 
     shares_disk = False
@@ -89,7 +90,7 @@ class Cluster(TaskPool):
         self._client = client
         self._check = check
         self._patience_s = patience_s
-        self._executor = client.get_executor(pure=False)  # two equal calls are two runs
+        self._executor = client.get_executor(pure=False)  # dask must compute equal calls, too
         self._waiting: set[Future[Any]] = set()
         threading.Thread(target=self._watch, daemon=True).start()
 
@@ -102,7 +103,7 @@ class Cluster(TaskPool):
         return future
 
     def failure(self, error: BaseException) -> str:
-        """Return why a future failed: "worker_died", or "error" of the task itself.
+        """Return why a future failed: "worker_died", or "error" if the task raised one.
 
         Raises StoreError if the scheduler is lost.
         """
@@ -123,12 +124,13 @@ class Cluster(TaskPool):
     def _watch(self) -> None:
         """Fail all waiting futures if the cluster has no worker for `patience_s`.
 
-        Otherwise they would wait without end.
+        Otherwise the futures would wait without end.
         """
         without_since = time.monotonic()
         while time.monotonic() - without_since < self._patience_s:
             time.sleep(min(self._patience_s / 2.0, 1.0))
-            # The scheduler is gone, which ends the futures, too; or this client is closed.
+            # An error means that the scheduler is gone, which also ends the futures, or that this
+            # client is closed.
             with suppress(Exception):
                 if self._client.nthreads():
                     without_since = time.monotonic()
@@ -136,27 +138,28 @@ class Cluster(TaskPool):
             f"engine dask: no workers for {self._patience_s:g} s; stored runs are kept"
         )
         for future in list(self._waiting):
-            with suppress(Exception):  # one that has just ended
+            with suppress(Exception):  # the future has just ended
                 future.set_exception(error)
 
 
 def run_as_worker(
     work: Callable[[T], R], task: T, timeout_s: float, check: Callable[[], object]
 ) -> R:
-    """Call `work(task)` in a worker of a cluster, which is ended if the task takes too long.
+    """Return `work(task)`, called in a worker of a cluster; end the worker if it takes too long.
 
-    Dask has no time limits; the worker's nanny starts a new one. It is ended by a watchdog outside
-    the interpreter, as an engine that hangs may hold the interpreter's lock.
+    Dask has no time limits for tasks. A watchdog therefore ends the worker process, and the nanny
+    of dask starts a new one. The watchdog is outside the interpreter, as an engine that hangs may
+    hold the interpreter's lock.
 
     Parameters
     ----------
     work, task : a function and its argument.
     timeout_s : time limit in s.
-    check : called before; raises an error in a worker that must not be used.
+    check : function that is called first. It raises an error in a worker that must not be used.
     """
     import faulthandler
 
-    check()  # the worker may have joined later
+    check()  # the worker may have joined the cluster after `open_cluster` called this function
     with open(os.devnull, "w") as nowhere:  # noqa: PTH123  (a device)
         faulthandler.dump_traceback_later(timeout_s, exit=True, file=nowhere)
         try:

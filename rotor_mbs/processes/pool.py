@@ -28,21 +28,22 @@ T = TypeVar("T")
 R = TypeVar("R")
 
 _PER_WORKER = 2  # tasks submitted per worker: one to work on, one waiting
-# If so many tasks in a row fail for lack of memory, files or processes, the others are given up.
+# If so many tasks in a row fail for lack of memory, files or processes, the rest is not run.
 _MAX_SYSTEM_FAILURES = 10
 
 
 @dataclass(frozen=True, slots=True)
 class TaskEnd(Generic[T, R]):
-    """The end of a task.
+    """The result of a task, or the reason why it has none.
 
     Attributes
     ----------
     task : the task.
-    value : its result; None where it has none.
-    failure : "timed_out", "worker_died" or "error" where it has no result; otherwise "".
-    message : why, in one line.
-    error : what the task raised, or what the system lacked.
+    value : result of the task; None if it has none.
+    failure : "timed_out", "worker_died" or "error" if the task has no result; otherwise "".
+    message : cause of the failure in one line; "" if the task has a result.
+    error : error that the task raised, or that the system caused for lack of memory, files or
+        processes; otherwise None.
     """
 
     task: T
@@ -55,12 +56,13 @@ class TaskEnd(Generic[T, R]):
 class TaskPool(ABC):
     """A context manager that runs tasks.
 
-    Its workers are processes of this machine (`WorkerPool`), or of a cluster.
+    The tasks run in processes of this machine (`WorkerPool`), in this process (`SerialPool`), or in
+    a cluster (`cluster.Cluster`).
 
     Attributes
     ----------
-    workers : how many tasks run at once.
-    shares_disk : whether the workers see the files of this process.
+    workers : number of tasks that run at once.
+    shares_disk : whether the workers can read and write the files of this process.
     """
 
     workers: int
@@ -84,7 +86,7 @@ class TaskPool(ABC):
         self.close()
 
 
-Workers: TypeAlias = int | TaskPool  # how many processes, or a pool that is open
+Workers: TypeAlias = int | TaskPool  # number of worker processes, or an open pool
 
 
 class WorkerPool(TaskPool):
@@ -96,13 +98,13 @@ class WorkerPool(TaskPool):
 
     Parameters
     ----------
-    workers : how many processes.
-    initializer : called first in every process; an error that it raises becomes that of the
-        next task of the process.
+    workers : number of processes.
+    initializer : function that every process calls first. If it raises an error, the next task of
+        the process raises this error.
     core : number of the core to which the processes are bound, if the system allows it; None for
         any.
-    environment : default environment variables of the processes; those of this process take
-        precedence.
+    environment : values of environment variables that the processes get if they are not set in this
+        process.
 
     Examples
     --------
@@ -129,7 +131,8 @@ class WorkerPool(TaskPool):
         self._workers = [
             Worker(initializer, core=core, environment=environment) for _ in range(workers)
         ]
-        # The last one that became free is taken first: with few tasks, few processes are started.
+        # The worker that became free last is used first. If there are few tasks, few processes are
+        # then started.
         self._free: LifoQueue[Worker] = LifoQueue()
         for worker in reversed(self._workers):
             self._free.put(worker)
@@ -138,15 +141,18 @@ class WorkerPool(TaskPool):
                 self._in_thread(worker.start)
 
     def submit(self, work: Callable[[T], R], task: T, timeout_s: float) -> Future[R]:
-        """Return the future of `work(task)`, which ends as `Worker.run` does.
+        """Return the future of `work(task)`, which has the result or the error of `Worker.run`.
 
-        Function, task and result must be picklable; the time limit counts from when a process
-        begins with the task. Raises ResourceError.
+        Function, task and result must be picklable. The time limit counts from the moment at which
+        a process begins the task. Raises ResourceError if a thread cannot be started.
         """
         return self._in_thread(self._run, work, task, timeout_s)
 
     def close(self) -> None:
-        """End the processes at once. Futures that were running raise TaskLostError."""
+        """End the processes at once.
+
+        The futures of running tasks then raise TaskLostError. Those of waiting tasks are cancelled.
+        """
         with delayed_interrupts():
             for worker in self._workers:
                 worker.close()
@@ -169,7 +175,7 @@ class WorkerPool(TaskPool):
 class SerialPool(TaskPool):
     """A pool that runs tasks in this process, one after the other, without time limits.
 
-    It serves scripts that must not start processes.
+    It is for scripts that must not start processes.
 
     >>> SerialPool().submit(abs, -3, timeout_s=10.0).result()
     3
@@ -178,12 +184,12 @@ class SerialPool(TaskPool):
     workers = 1
 
     def submit(self, work: Callable[[T], R], task: T, timeout_s: float) -> Future[R]:  # noqa: ARG002
-        """Call `work(task)` now, and return its finished future; there is no time limit."""
+        """Call `work(task)` now, without a time limit, and return a future that is done."""
         future: Future[R] = Future()
         try:
             with system_errors_apart():
                 future.set_result(work(task))
-        except (Exception, SystemExit) as exc:  # also of another package's method
+        except (Exception, SystemExit) as exc:  # a method of another package may raise any
             is_exit = isinstance(exc, SystemExit)
             future.set_exception(RuntimeError(one_line(exc)) if is_exit else exc)
         return future
@@ -208,8 +214,8 @@ def local_pool(
 
     Parameters
     ----------
-    workers : how many; with 0, tasks run in this process, without a time limit.
-    initializer, environment : of the processes, as for `WorkerPool`.
+    workers : number of processes. With 0, tasks run in this process, without a time limit.
+    initializer, environment : arguments of `WorkerPool`; not used with 0 workers.
 
     Raises
     ------
@@ -221,7 +227,10 @@ def local_pool(
 
 
 def pool_of(workers: Workers) -> AbstractContextManager[TaskPool]:
-    """Return a new `local_pool` that is closed after the block, or a given pool, which is not."""
+    """Return a context manager for a pool, given an open pool or a number of workers.
+
+    A given pool remains open after the block. A number makes a new `local_pool`, which is closed.
+    """
     return nullcontext(workers) if isinstance(workers, TaskPool) else local_pool(workers)
 
 
@@ -232,28 +241,30 @@ def run_in(
     timeout_s: float | Callable[[T], float],
     split: Callable[[T], Sequence[T]] | None = None,
 ) -> Iterator[TaskEnd[T, R]]:
-    """Call `work(task)` for all tasks in a pool that is open, and yield how each ended.
+    """Call `work(task)` for all tasks in an open pool, and yield the end of each.
 
-    If a task exceeds its time limit or its worker dies, and it can be split, its parts are tried. A
-    task that cannot be split and whose worker died is tried once more at the end, alone.
+    If a task exceeds its time limit, or its worker dies, it is split if possible, and its parts are
+    run in its place. A task that cannot be split is run once more if its worker died: at the end,
+    alone.
 
     Parameters
     ----------
-    pool : the pool.
-    work : a function of a task.
-    tasks : taken as workers become free.
-    timeout_s : time limit of a task in s, or a function of the task.
-    split : returns the parts of a task that consists of many runs; an empty sequence for one that
+    pool : the open pool.
+    work : function that is called with each task.
+    tasks : the tasks; the next one is taken from the iterable when a worker becomes free.
+    timeout_s : time limit of a task in s, or a function that returns it for a task.
+    split : (task) -> parts of a task that consists of many runs; an empty sequence if the task
         cannot be split.
 
     Raises
     ------
     ResourceError
-        If several tasks in a row fail for lack of memory, files or processes, or as code cannot be
-        loaded.
+        If several tasks in a row fail because memory, files or processes are lacking, or because
+        code cannot be loaded.
     """
-    retries: dict[str, list[T]] = {"timed_out": [], "worker_died": []}  # by failure
-    system_failures = 0  # in a row
+    # Tasks and parts of tasks that are run again, by failure.
+    retries: dict[str, list[T]] = {"timed_out": [], "worker_died": []}
+    system_failures = 0  # number of them in a row
 
     def ends_of(tasks: Iterable[T], at_once: int) -> Iterator[TaskEnd[T, R]]:
         waiting: dict[Future[R], T] = {}
@@ -268,7 +279,7 @@ def run_in(
     def next_ends(waiting: dict[Future[R], T]) -> Iterator[TaskEnd[T, R]]:
         nonlocal system_failures
         done = wait(waiting, return_when=FIRST_COMPLETED).done
-        # Several may have ended: they are taken in the order in which they were submitted.
+        # If several tasks have ended, they are yielded in the order in which they were submitted.
         for future in [future for future in waiting if future in done]:
             end = _end_of(waiting.pop(future), future, pool)
             is_system_failure = end.failure == "worker_died" and end.error is not None
@@ -287,7 +298,7 @@ def run_in(
                 retries[end.failure].extend(parts or [end.task])
             else:
                 yield end
-    # One at a time: no other task then takes the memory that one of these may need.
+    # These tasks run one at a time, so that no other task takes the memory that they may need.
     for end in ends_of(retries["worker_died"], 1):
         if end.failure == "worker_died":
             yield replace(end, message=f"{end.message}, also when it was retried alone")
@@ -296,18 +307,18 @@ def run_in(
 
 
 def _end_of(task: T, future: Future[R], pool: TaskPool) -> TaskEnd[T, R]:
-    """Return how a task ended.
+    """Return the end of a task whose future is done.
 
     Parameters
     ----------
     task : the task.
-    future : its future, which is done.
-    pool : which says how a task failed.
+    future : future of the task.
+    pool : the pool, whose method `failure` tells why a task failed.
 
     Returns
     -------
     TaskEnd
-        Its `error` is set only for an error of the task itself or of the system.
+        Its `error` is set only if the task itself or the system caused it.
     """
     error = CancelledError() if future.cancelled() else future.exception()
     if error is None:

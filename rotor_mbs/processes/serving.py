@@ -1,4 +1,4 @@
-"""Answer the requests of the parent in a worker process, see `processes.worker`."""
+"""Answer requests of the parent in a worker process; `processes.worker` is the parent's side."""
 
 from __future__ import annotations
 
@@ -26,23 +26,25 @@ def serve() -> None:
         _is_worker = True
         _end_with_parent()
         signal.signal(signal.SIGINT, signal.SIG_IGN)
-        # Loading engines and drawing leave few cycles, and collecting took a twentieth.
+        # Garbage is collected less often: loading engines and drawing leave little of it, and the
+        # collections took a twentieth of the time.
         gc.set_threshold(50_000, 20, 20)
         del sys.argv[1:]
         requests, answers = _private_pipes()
         received: queue.SimpleQueue[bytes] = queue.SimpleQueue()
-        # The thread ends this process with its input, whatever the main thread does.
+        # The thread ends this process when its input ends, whatever the main thread does.
         threading.Thread(target=_receive, args=(requests, received), daemon=True).start()
         while True:
             send(answers, _answer(received.get()))
-    finally:  # on an exit or an error: the parent sees that this process has ended
+    finally:  # after an exit or an error, the parent sees that this process has ended
         os._exit(1)
 
 
 def _end_with_parent() -> None:
-    """Have Linux end this process with its parent.
+    """Make Linux end this process when the parent ends.
 
-    Elsewhere a thread does so, which an engine that keeps the interpreter's lock stops.
+    On other systems only the thread in `_receive` does so. It cannot run while an engine holds the
+    interpreter's lock.
     """
     if sys.platform == "linux":
         with suppress(ImportError, OSError, AttributeError):
@@ -53,12 +55,12 @@ def _end_with_parent() -> None:
 
 
 def _private_pipes() -> tuple[BinaryIO, BinaryIO]:
-    """Return the pipes of requests and answers.
+    """Return the pipes of requests and answers, moved to new file descriptors.
 
-    They get new numbers, so that code that reads or prints does not reach them.
+    Code that reads from standard input, or prints, then does not reach the pipes.
     """
     nothing = os.open(os.devnull, os.O_RDWR)
-    while nothing <= 2:  # the parent's standard error may have been closed
+    while nothing <= 2:  # descriptor 2 is free if the parent's standard error was closed
         nothing = os.open(os.devnull, os.O_RDWR)
     pipes = [os.dup(0), os.dup(1)]
     os.dup2(nothing, 0)
@@ -69,7 +71,8 @@ def _private_pipes() -> tuple[BinaryIO, BinaryIO]:
     def close_in_fork() -> None:
         """Close the pipes in a process that a method forks.
 
-        It may outlive this process, and open pipes would hide the end of this one.
+        The forked process may outlive this one. With its copies of the pipes open, the parent would
+        not see that this process has ended.
         """
         while pipes:
             os.close(pipes.pop())
@@ -80,7 +83,7 @@ def _private_pipes() -> tuple[BinaryIO, BinaryIO]:
 
 
 def _receive(requests: BinaryIO, received: queue.SimpleQueue[bytes]) -> None:
-    """Pass requests on to the main thread; end this process when they end."""
+    """Pass requests on to the main thread; end this process when the pipe is closed."""
     try:
         while True:
             received.put(pickle.load(requests))
@@ -91,7 +94,7 @@ def _receive(requests: BinaryIO, received: queue.SimpleQueue[bytes]) -> None:
 def set_up(
     core: int | None, memory_limit: int | None, initializer: Callable[[], object] | None
 ) -> None:
-    """Set the core and the limit of memory of this process, and call its initializer."""
+    """Set the core and the memory limit (bytes) of this process, and call its initializer."""
     if core is not None and hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, {core})
     if memory_limit is not None:
@@ -102,7 +105,7 @@ def set_up(
 
 
 def _keep_below_limit_of_parent() -> None:
-    """Make the parent's limit of address space one that this process cannot raise."""
+    """Prevent that this process raises its limit of address space above that of the parent."""
     with suppress(ImportError):  # Windows
         import resource
 
@@ -136,9 +139,9 @@ def limit_resources(memory: int, processor_s: int | None = None) -> None:
 
 
 def address_space() -> float:
-    """Return the limit of address space (bytes) of this process; infinite without one.
+    """Return the limit of address space (bytes) of this process; infinity if there is none.
 
-    It holds for the processes that it starts, too.
+    Processes that this one starts inherit the limit.
     """
     with suppress(ImportError):  # Windows
         import resource
@@ -155,19 +158,21 @@ def is_worker() -> bool:
 
 
 def _answer(request: bytes) -> bytes:
-    """Return the pickled (result, error) of a request.
+    """Call the function in a request, and return the pickled tuple (result, error).
 
-    A result or error that cannot be pickled, and an exit, become an error of the task.
+    A result that cannot be pickled counts as an error. A RuntimeError replaces an exit, and an
+    error that cannot be pickled.
 
     Parameters
     ----------
-    request : pickled: a folder, and a pickled function with its argument.
+    request : pickled tuple of the folder in which the function runs, or "", and of another pickled
+        tuple: the function and its argument.
     """
     try:
         with system_errors_apart():
             folder, call = pickle.loads(request)
             if folder:
-                with suppress(OSError):  # it is gone, and the parent has that, too
+                with suppress(OSError):  # the folder is gone, also for the parent
                     os.chdir(folder)
             work, task = pickle.loads(call)
             result = work(task)
@@ -175,11 +180,11 @@ def _answer(request: bytes) -> bytes:
     except Exception as exc:
         try:
             answer = pickle.dumps((None, exc))
-            pickle.loads(answer)  # not every error arrives as it is sent
+            pickle.loads(answer)  # some errors can be pickled but not read again
         except Exception:
             return pickle.dumps((None, RuntimeError(one_line(exc))))
         return answer
-    except BaseException as exc:  # SystemExit and the like must not end the parent
+    except BaseException as exc:  # SystemExit and the like, raised in the parent, would end it
         return pickle.dumps((None, RuntimeError(one_line(exc))))
 
 

@@ -1,7 +1,8 @@
 """Call functions in a worker process, which can be ended at any time.
 
-It is a plain Python process with the import path of its parent. Functions, arguments and results
-pass through two pipes as pickles, so that it does not need the script that its parent runs.
+A worker process is a plain Python process with the import path of its parent. Functions, arguments
+and results are sent through two pipes as pickles. The process therefore does not need to import the
+script that its parent runs.
 """
 
 from __future__ import annotations
@@ -31,32 +32,34 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 R = TypeVar("R")
 
-SET_UP_LIMIT_S = 300.0  # large engines load in seconds, on a busy machine in minutes
-# The processes are the parallelism, and timings must not depend on a library's threads.
+SET_UP_LIMIT_S = 300.0  # s; large engines load in seconds, on a busy machine in minutes
+# Libraries run one thread each: work is parallel by processes, and timings must not depend on
+# threads.
 _ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
-# Without -P, Python would import from the current folder.
+# Program of the process. The option -P is needed, as Python would otherwise import from the current
+# folder.
 _PROGRAM = (
     "import sys; sys.path[:] = sys.argv[1:]; from rotor_mbs.processes.serving import serve; serve()"
 )
 _SIGNALS_OF_END = [
     getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
 ]
-_RETRY_START_S = 1.0  # pause after the system could not start a process
-_END_S = 1.0  # until a process whose pipe is closed has ended
-# Errors that are raised by a pipe if its other end is closed.
+_RETRY_START_S = 1.0  # s, pause after the system could not start a process
+_END_S = 1.0  # s, time that a process gets to end after its pipe was closed
+# Errors that a pipe raises if its other end is closed.
 _PIPE_ERRORS = (EOFError, ConnectionError, pickle.UnpicklingError)
 
 
 class TaskLostError(RotorError):
-    """Raised if a task leaves no result.
+    """Raised if the process of a task ends before the task has a result.
 
     Attributes
     ----------
-    failure : "timed_out" if it exceeded its time limit; "worker_died" if its process died. It is
-        "worker_died" for both if this process has a memory limit: a process that exceeded the time
-        limit may then have waited for memory.
-    exit_code : of a process that died by itself, negative for the number of a signal; None for one
-        that was ended at the time limit.
+    failure : "timed_out" if the task exceeded its time limit; "worker_died" if its process died. If
+        this process has a memory limit, it is "worker_died" in both cases, as a task that exceeded
+        the time limit may have waited for memory.
+    exit_code : exit code of the process, negative if a signal ended it; None if the process was
+        ended at the time limit.
     """
 
     def __init__(self, message: str, failure: str, exit_code: int | None = None) -> None:
@@ -68,20 +71,23 @@ class TaskLostError(RotorError):
 class Worker:
     """A process that calls one function at a time, keeps its state, and is replaced if it dies.
 
-    It starts when it is first used, ignores Ctrl-C, and ends with its parent. Its functions run in
-    the parent's current folder. Threads that call it take turns; a process that is forked off the
-    parent has a worker process of its own. A context manager.
+    The process starts when it is first used, ignores Ctrl-C, and ends with its parent. Its
+    functions run in the current folder of the parent. If several threads call a worker, they take
+    turns. In a process that is forked off the parent, the worker starts a process of its own.
+
+    A worker is a context manager, which closes it after the block.
 
     Parameters
     ----------
-    initializer : called first in every process; an error that it raises becomes that of the
-        next task.
+    initializer : function that every process calls first. If it raises an error, the next task
+        raises this error.
     core : number of the core to which the process is bound, if the system allows it; None for any.
     memory_limit : bytes of address space, if the system can limit it; None for no limit.
-    is_silent : whether what the process prints is dropped; otherwise it goes to standard error.
-    environment : default environment variables of the process; those of this process take
-        precedence.
-    set_up_limit_s : time for the start of the process, its imports and its initializer, in s.
+    is_silent : whether output of the process is dropped; otherwise it goes to standard error.
+    environment : values of environment variables that the process gets if they are not set in this
+        process.
+    set_up_limit_s : s, time limit for the start of the process, and once more for its imports and
+        its initializer.
 
     Examples
     --------
@@ -100,7 +106,7 @@ class Worker:
         environment: Mapping[str, str] = MappingProxyType({}),
         set_up_limit_s: float = SET_UP_LIMIT_S,
     ) -> None:
-        """Note how the process is to be started; none is started yet.
+        """Store how the process is to be started; no process is started yet.
 
         Parameters
         ----------
@@ -109,7 +115,8 @@ class Worker:
         self._set_up = partial(set_up, core, memory_limit)
         self._initializer = initializer
         self._default_environment = _ONE_THREAD | dict(environment)
-        # Idle threads, too, take address space.
+        # Under a memory limit, variables of this process do not change the number of threads: even
+        # idle threads take address space.
         self._fixed_environment = _ONE_THREAD if memory_limit is not None else {}
         self._stderr = subprocess.DEVNULL if is_silent else None
         self._set_up_limit_s = set_up_limit_s
@@ -120,12 +127,15 @@ class Worker:
         _workers.add(self)
 
     def start(self) -> _Process:
-        """Start the process unless it is running; it loads its code while the caller continues.
+        """Return the process, after starting it if it is not running.
+
+        A new process loads its code while the caller continues.
 
         Raises
         ------
         ResourceError
-            If this worker is closed, or the system cannot start a process (after a pause).
+            If this worker is closed, or the system cannot start a process. If the system has
+            reported an error, there is a pause before this one is raised.
         """
         with self._lock:
             if self._process is not None and self._process.poll() is not None:
@@ -138,26 +148,26 @@ class Worker:
             return self._process
 
     def run(self, work: Callable[[T], R], task: T, timeout_s: float) -> R:
-        """Call `work(task)` in the process, in the current folder of this one.
+        """Return `work(task)`, called in the worker process, in the current folder of this process.
 
         Parameters
         ----------
-        work, task : a function and its argument, which can be pickled.
+        work, task : a function and its argument; both must be picklable.
         timeout_s : time limit in s, counted from the start of the task, after the initializer.
 
         Raises
         ------
         TaskLostError
-            If the process died, or was ended, at the time limit or by `close`.
+            If the process died, or was ended at the time limit or by `close`.
         ResourceError
             If no process could be started.
         Exception
-            What `work` raised. If that cannot be pickled, a RuntimeError with its first line.
-            Also an error that is raised in this process while it waits, for example by the handler
-            of a signal.
+            The error that `work` raised. If it cannot be pickled, a RuntimeError with its type and
+            the first line of its text. Also an error that is raised in this process while it waits,
+            for example by a signal handler.
         """
         folder = ""
-        with suppress(OSError):  # the folder is gone
+        with suppress(OSError):  # the current folder was deleted
             folder = os.getcwd()  # noqa: PTH109  (a text)
         request = pickle.dumps((work, task))
         with self._turn:
@@ -167,7 +177,7 @@ class Worker:
                 if not process.is_set_up:
                     self._wait_until_set_up(process)
                 answer = process.exchange(pickle.dumps((folder, request)), timeout_s)
-            except BaseException:  # its late answer would be taken for that of the next task
+            except BaseException:  # a late answer would be taken for the answer to the next task
                 if process is not None:
                     process.end()
                 raise
@@ -181,9 +191,9 @@ class Worker:
                 self._process.end()
 
     def close(self) -> None:
-        """End the process at once with its task, and start no other.
+        """End the process at once with its task, and prevent that another one is started.
 
-        It may be called from any thread.
+        Any thread may call this method.
         """
         self._is_closed = True
         self.end_process()
@@ -207,14 +217,14 @@ class Worker:
         beginning: Future[_Process] | None = None
         try:
             try:
-                # An interrupt just after the executor has started its thread would leave a thread
-                # that it does not know, and for which Python waits at its end.
+                # After an interrupt just when the executor has started its thread, the executor
+                # would not know the thread. Python would then wait for the thread at its end.
                 with delayed_interrupts():
                     beginning = _starter(os.getpid()).submit(self._begin)
             except RuntimeError as exc:
                 raise _not_started(str(exc)) from exc
-            # `exception` returns an error of the start. An error that is raised here has another
-            # cause, such as an interrupt.
+            # `beginning.exception()` returns an error of the start. An error that is raised in
+            # this block, not returned, has another cause, such as an interrupt.
             done, _ = wait([beginning], self._set_up_limit_s)
             if not done:
                 raise _not_started(f"the system did not start it in {self._set_up_limit_s:g} s")
@@ -224,16 +234,16 @@ class Worker:
                 raise _not_started(str(error)) from error
             process = beginning.result()
             request = pickle.dumps((self._set_up, self._initializer))
-            process.send(pickle.dumps(("", request)))  # in the folder in which it starts
+            process.send(pickle.dumps(("", request)))  # "": it stays in its folder
         except BaseException:
-            if beginning is not None:  # no caller waits for it any more
+            if beginning is not None:  # no caller waits for the process any more
                 beginning.add_done_callback(_end_begun)
             raise
         return process
 
     def _begin(self) -> _Process:
-        """Start a process. Raises OSError."""
-        # The package's folder is added, as Python may have found it by a relative path.
+        """Start a process and return it. Raises OSError if the system cannot start it."""
+        # The folder of the package is added, as `sys.path` may have it as a relative path.
         folders = [*map(str, sys.path), str(Path(__file__).parents[2])]
         return _Process(
             [sys.executable, "-P", "-c", _PROGRAM, *folders],
@@ -244,7 +254,7 @@ class Worker:
         )
 
     def _wait_until_set_up(self, process: _Process) -> None:
-        """Wait until the initializer has returned, and raise what it raises.
+        """Wait until the initializer has returned; raise an error that it has raised.
 
         Raises ResourceError if the process ends or takes too long.
         """
@@ -259,9 +269,10 @@ class Worker:
         process.is_set_up = True
 
     def _forget_after_fork(self) -> None:
-        """Leave the process to the parent, in a child that was forked off it.
+        """Forget the worker process, in a child that was forked off the parent.
 
-        The child gets new locks, as the old ones may have been held by other threads of the parent.
+        The worker process remains that of the parent. The child gets new locks, as other threads of
+        the parent may have held the old ones.
         """
         self._turn, self._lock = threading.Lock(), threading.Lock()
         if self._process is not None:
@@ -273,7 +284,7 @@ _workers: weakref.WeakSet[Worker] = weakref.WeakSet()
 
 
 def _forget_processes() -> None:
-    """Leave all worker processes to the parent, in a child that was forked off it."""
+    """Forget all worker processes, in a child that was forked off the parent."""
     for worker in list(_workers):
         worker._forget_after_fork()
 
@@ -295,9 +306,9 @@ class _Process(subprocess.Popen[bytes]):
     is_set_up = False
 
     def send(self, message: bytes) -> None:
-        """Send a message; if the process has died, the next answer shows that.
+        """Send a message. If the process has died, not this call but the next `exchange` fails.
 
-        Raises an error that is raised meanwhile in this process.
+        An error with another cause is raised, for example one of a signal handler.
         """
         try:
             send(self.stdin, message)
@@ -310,8 +321,8 @@ class _Process(subprocess.Popen[bytes]):
 
         Parameters
         ----------
-        request : a pickled message; an empty one is not sent.
-        timeout_s : time limit of the answer in s, after which the process is ended.
+        request : a pickled message; if it is empty, nothing is sent.
+        timeout_s : s, time limit of the answer, at which the process is ended.
 
         Raises
         ------
@@ -320,7 +331,7 @@ class _Process(subprocess.Popen[bytes]):
         ResourceError
             If the system cannot start the thread that watches the time.
         Exception
-            What is raised in this process while it waits.
+            An error that is raised in this process while it waits, for example by a signal handler.
         """
         answer = b""
         with self._killed_after(timeout_s) as is_late:
@@ -329,13 +340,13 @@ class _Process(subprocess.Popen[bytes]):
                     send(self.stdin, request)
                 answer = pickle.load(self.stdout)
             except Exception as exc:
-                # An error of a pipe mostly means that the process has ended. A signal handler, or
-                # a lack of memory here, may raise any error, which says nothing of the process.
+                # An error of a pipe mostly means that the process has ended. But a signal handler,
+                # or a lack of memory here, may raise any error while the process still runs.
                 if not is_late.is_set() and not self._ends(exc):
                     raise
         if is_late.is_set():  # even if it answered at the same moment
-            # Under a memory limit a process may wait for memory without end: the time says nothing
-            # of the task.
+            # Under a memory limit a process may wait for memory without end. The task then need not
+            # be a slow one.
             limit = memory_limit_text()
             failure = "worker_died" if limit else "timed_out"
             raise TaskLostError(f"ended after {timeout_s:g} s{limit}", failure)
@@ -345,7 +356,10 @@ class _Process(subprocess.Popen[bytes]):
         return answer
 
     def _ends(self, error: Exception) -> bool:
-        """Return whether the process has ended, or ends soon after an error of its pipes."""
+        """Return whether the process has ended.
+
+        If the error is one of a pipe, the process gets _END_S seconds to end.
+        """
         try:
             self.wait(_END_S if isinstance(error, _PIPE_ERRORS) else 0.0)
         except subprocess.TimeoutExpired:
@@ -354,7 +368,7 @@ class _Process(subprocess.Popen[bytes]):
 
     @contextmanager
     def _killed_after(self, limit_s: float) -> Iterator[threading.Event]:
-        """Kill the process if the block takes too long; yield the event that is set then.
+        """Yield an event; if the block takes too long, set the event and kill the process.
 
         Parameters
         ----------
@@ -385,7 +399,7 @@ class _Process(subprocess.Popen[bytes]):
     def end(self, patience_s: float = 0.0) -> int:
         """End the process and return its exit code.
 
-        It is killed if it has not ended by itself within `patience_s`.
+        The process is killed if it has not ended by itself within `patience_s` seconds.
         """
         try:
             code = self.wait(patience_s)
@@ -398,13 +412,14 @@ class _Process(subprocess.Popen[bytes]):
         return code
 
     def forget(self) -> None:
-        """Close the pipes in a forked child of the parent, and wait for nothing.
+        """Close the pipes without waiting, in a child that was forked off the parent.
 
-        The child's copy of data that the parent was sending is dropped.
+        If the parent was sending data during the fork, the child drops its copy of them.
         """
-        self.returncode = 0  # it is no child of this process
+        self.returncode = 0  # nothing is to wait for it, as it is not a child of this process
         for stream in (self.stdin, self.stdout):
-            # Raw, as the buffer's lock may be held by a thread that was not copied by the fork.
+            # Only the raw stream can be closed: a thread that the fork has not copied may hold the
+            # lock of the buffer.
             cast(Any, stream).raw.close()
 
 
@@ -415,19 +430,25 @@ def _end_begun(beginning: Future[_Process]) -> None:
 
 
 def _not_started(reason: str) -> ResourceError:
-    """Return the error of a process that could not be started.
+    """Return the error for a process that could not be started.
 
-    It has the reason, and the memory limit of this process if there is one.
+    The message has the reason and, if this process has a memory limit, the limit.
     """
     return ResourceError(f"a process could not be started: {reason}{memory_limit_text()}")
 
 
 @cache
 def _starter(_process_id: int) -> ThreadPoolExecutor:
-    """Return the thread of a parent process that starts its workers.
+    """Return an executor whose only thread starts the worker processes.
 
-    Linux ends a worker when the thread that started it ends: that must not be a caller's thread.
-    This one blocks Ctrl-C, and so do the processes that it starts, from their first moment on.
+    Linux ends a worker process when the thread that started it ends. A caller's thread may end too
+    early; the thread of the executor does not. It blocks Ctrl-C, and the processes that it starts
+    inherit this, so that Ctrl-C does not end them even in their first moments.
+
+    Parameters
+    ----------
+    _process_id : number of the process that calls. A process that is forked off it has another
+        number, and gets an executor of its own.
     """
     from concurrent.futures import ThreadPoolExecutor  # late: `rotor-mbs list` starts no process
 
@@ -435,7 +456,7 @@ def _starter(_process_id: int) -> ThreadPoolExecutor:
 
 
 def _block_interrupts() -> None:
-    """Keep Ctrl-C from this thread and from the processes that it starts."""
+    """Block Ctrl-C in this thread, and in the processes that it starts."""
     if hasattr(signal, "pthread_sigmask"):  # not on Windows
         signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
 
@@ -444,7 +465,8 @@ def _block_interrupts() -> None:
 def delayed_interrupts() -> Iterator[None]:
     """Delay Ctrl-C, SIGTERM and SIGHUP to the end of the block.
 
-    A block that ends processes then ends all of them, and one that starts a thread knows it.
+    An interrupt then cannot prevent that a block ends all of several processes, or that it stores a
+    thread that it has started.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -453,7 +475,8 @@ def delayed_interrupts() -> Iterator[None]:
     before: dict[signal.Signals, Any] = {}
     try:
         for number in _SIGNALS_OF_END:
-            # One that is ignored (nohup) stays so: a process that is started meanwhile inherits it.
+            # A signal that is ignored, as under nohup, remains so. A process that is started in the
+            # block then ignores it, too.
             if signal.getsignal(number) != signal.SIG_IGN:
                 before[number] = signal.signal(number, lambda number, _: received.append(number))
         yield
@@ -465,7 +488,7 @@ def delayed_interrupts() -> Iterator[None]:
 
 
 def memory_limit_text() -> str:
-    """Return the limit of this process's memory in words, "" if there is none."""
+    """Return the memory limit of this process in words; "" if there is none."""
     limit = address_space()
     if math.isinf(limit):
         return ""
@@ -473,7 +496,7 @@ def memory_limit_text() -> str:
 
 
 def _result(answer: bytes) -> Any:
-    """Return the result of an answer, or raise its error."""
+    """Return the result that a worker process has sent, or raise the error that it has sent."""
     result, error = pickle.loads(answer)
     if error is not None:
         raise error
