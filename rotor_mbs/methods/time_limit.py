@@ -68,7 +68,7 @@ def time_limit(seconds: float) -> AbstractContextManager[object]:
 
 @contextmanager
 def samples_kept_at_limit() -> Iterator[None]:
-    """Prevent that a limit raises OutOfTimeError in the block.
+    """Prevent a time limit from raising OutOfTimeError in the block.
 
     The code in the block calls `is_over` instead, and keeps the samples computed so far.
     """

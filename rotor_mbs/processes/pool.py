@@ -264,7 +264,7 @@ def run_in(
     """
     # Tasks and parts of tasks that are run again, by failure.
     retries: dict[str, list[T]] = {"timed_out": [], "worker_died": []}
-    system_failures = 0  # number of them in a row
+    system_failures = 0  # number in a row
 
     def ends_of(tasks: Iterable[T], at_once: int) -> Iterator[TaskEnd[T, R]]:
         waiting: dict[Future[R], T] = {}

@@ -105,7 +105,7 @@ def set_up(
 
 
 def _keep_below_limit_of_parent() -> None:
-    """Prevent that this process raises its limit of address space above that of the parent."""
+    """Prevent this process from raising its limit of address space above the parent's."""
     with suppress(ImportError):  # Windows
         import resource
 

@@ -191,7 +191,7 @@ class Worker:
                 self._process.end()
 
     def close(self) -> None:
-        """End the process at once with its task, and prevent that another one is started.
+        """End the process at once with its task, and start no process any more.
 
         Any thread may call this method.
         """
@@ -306,9 +306,9 @@ class _Process(subprocess.Popen[bytes]):
     is_set_up = False
 
     def send(self, message: bytes) -> None:
-        """Send a message. If the process has died, not this call but the next `exchange` fails.
+        """Send a message. If the process has died, only the next `exchange` raises an error.
 
-        An error with another cause is raised, for example one of a signal handler.
+        An error with another cause is raised here, for example one of a signal handler.
         """
         try:
             send(self.stdin, message)
@@ -416,7 +416,7 @@ class _Process(subprocess.Popen[bytes]):
 
         If the parent was sending data during the fork, the child drops its copy of them.
         """
-        self.returncode = 0  # nothing is to wait for it, as it is not a child of this process
+        self.returncode = 0  # it is not a child of this process, so nothing must wait for it
         for stream in (self.stdin, self.stdout):
             # Only the raw stream can be closed: a thread that the fork has not copied may hold the
             # lock of the buffer.
@@ -465,8 +465,8 @@ def _block_interrupts() -> None:
 def delayed_interrupts() -> Iterator[None]:
     """Delay Ctrl-C, SIGTERM and SIGHUP to the end of the block.
 
-    An interrupt then cannot prevent that a block ends all of several processes, or that it stores a
-    thread that it has started.
+    A block that ends several processes is then not interrupted before it has ended all of them. A
+    block that starts a thread is not interrupted before it has stored the thread.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
