@@ -1,7 +1,8 @@
 """Define the design of a results file: requested runs, the tables of the file, their columns.
 
-The design is what is known of a row before it is computed: scene, method, settings, versions. Its
-columns are called known; the others are computed, and filled in row by row.
+The design is what is known of a row before it is computed: scene, method, settings, versions. The
+columns of the design are called known. All other columns are called computed: they are filled in
+row by row.
 """
 
 from __future__ import annotations
@@ -23,14 +24,16 @@ from rotor_mbs.solution.quantities import DEFECT, LOADS, SCALES, quantities, sca
 from rotor_mbs.solution.status import STATUSES
 
 MISSING = -1  # status of a row that is not stored
-# A run has a row in /runs, and one in the table of its scene's arrays, which repeats these columns.
-# Where both are joined to one row, the repeated ones have the names on the right.
+# A run has a row in /runs and a row in the table of its scene's arrays. The second row repeats the
+# columns on the left. When both are joined to one row, the repeated columns get the names on the
+# right.
 STATUS_COPIES = {"status": "status_repeated", "samples": "samples_repeated"}
-# Type of a column of computed texts: (run, characters) bytes of UTF-8, filled up with zeros.
+# Type of a column of computed texts. The column has the shape (run, characters): each text is
+# UTF-8 bytes, filled up with zeros.
 CHARACTER = "S1"
 RUNS = "runs"
-# Arrays of a frozen reference: angles and rates, and those that would be less precise if they were
-# derived from these.
+# Arrays of a frozen reference: angles, rates, and arrays that would lose precision if they were
+# derived from angles and rates.
 REFERENCE_ARRAYS = (
     "angles",
     "rates",
@@ -39,13 +42,16 @@ REFERENCE_ARRAYS = (
     "angle_uncertainty",
     "error_growth",
 )
-ONCE_A_SCENE = ("angle_uncertainty", "error_growth")  # over time, of the reference alone
+ONCE_A_SCENE = ("angle_uncertainty", "error_growth")  # arrays that only the reference has
 
 
 def flags(names: Sequence[str], first: int = 0) -> dict[str, Any]:
-    """Return the CF attributes of a column of codes.
+    """Return the CF attributes of a column of integer codes, which give the meaning of each code.
 
-    They say what each code from `first` on means.
+    Parameters
+    ----------
+    names : meanings of consecutive codes.
+    first : code of the first name.
     """
     return {
         "flag_values": np.arange(first, first + len(names), dtype=np.int8),
@@ -53,8 +59,8 @@ def flags(names: Sequence[str], first: int = 0) -> dict[str, Any]:
     }
 
 
-# Computed values of a row, in the order of their columns, which come before those of the metrics.
-# Each has the names of the tables in which it is stored.
+# Computed values of a row whose columns precede those of the metrics, in the order of the columns.
+# Each value has the names of the tables that store it.
 _OUTCOME_VALUES = {
     "status": RowValue(
         "1",
@@ -117,7 +123,7 @@ _OUTCOME_VALUES = {
         "s", "largest step of the ladder with an error of at most 1e-6 rad", "stability"
     ),
 }
-# Values after the metrics; the checksum is the last.
+# Computed values of a row whose columns follow those of the metrics. The checksum is the last.
 _CHECKSUM_VALUES = {
     "code": RowValue(
         "1",
@@ -140,15 +146,17 @@ def _column(value: RowValue) -> Column:
     return Column(dimensions, value.units, value.long_name, value.kind)
 
 
-# Every computed column that has one value per row.
+# Computed columns with one value per row, by name. `metric_columns` adds those of quantities.
 COLUMNS = {name: _column(value) for name, value in _ROW_VALUES.items()}
 COLUMNS["status"] = COLUMNS["status"]._replace(attributes=flags(("missing", *STATUSES), MISSING))
 
 
 def columns_in(table: str) -> dict[str, Column]:
-    """Return the computed columns of a table that have one value per row, by name.
+    """Return those of COLUMNS that a table has, by name.
 
-    The table is named as in `RowValue.tables`.
+    Parameters
+    ----------
+    table : name of the table, as in `RowValue.tables`.
     """
     columns = {}
     for name, value in _ROW_VALUES.items():
@@ -157,8 +165,8 @@ def columns_in(table: str) -> dict[str, Column]:
     return columns
 
 
-# Units and long name of each known column, in the order of the file; other values of a design have
-# no column.
+# Units and long name of each known column of runs and points, in the order of the file. A value of
+# a design under another name is not stored in a column.
 DESIGN_COLUMNS = {
     "scene": ("1", "name of the scene"),
     "method_name": ("1", "name of the method: model/integrator"),
@@ -172,10 +180,10 @@ DESIGN_COLUMNS = {
     "tolerance": ("1", "tolerance of the method"),
     "order_expected": ("1", "order of the method"),
 }
-NUMBERS = ("step", "tolerance", "order_expected")  # known columns of numbers; others are texts
+NUMBERS = ("step", "tolerance", "order_expected")  # known columns of numbers; the rest have texts
 
-_TEXT_LENGTH = 600  # characters of a message
-# The computed columns of each table of points.
+_TEXT_LENGTH = 600  # bytes of a computed text in /runs, such as a message
+# Computed columns of the tables of points, by table.
 POINT_COLUMNS: Mapping[str, Mapping[str, Column]] = {
     table: columns_in(table) for table in ("bench", "stability")
 }
@@ -183,14 +191,16 @@ POINT_COLUMNS: Mapping[str, Mapping[str, Column]] = {
 
 @dataclass(frozen=True)
 class RunRequest:
-    """A run as it is requested: a row of the design.
+    """A requested run: a row of the design.
 
     Attributes
     ----------
     scene : the scene.
-    method, settings : name of the method, and the settings that are given for it.
-    versions : of what computes it; None for those of this installation. For a reference that is
-        read from a shipped file they include those that it was computed with (`frozen_with`).
+    method : name of the method.
+    settings : the settings of the method that are given.
+    versions : versions of the software that computes the run; None for those of this installation.
+        A reference that is read from a shipped file also has `frozen_with`, the versions of the
+        software that computed it.
     """
 
     scene: Scene
@@ -205,7 +215,7 @@ class RunRequest:
 
     @property
     def label(self) -> str:
-        """Return the label of its row: "paper/fig11/lagrange/taylor"."""
+        """Return the label of the run's row, such as "paper/fig11/lagrange/taylor"."""
         return f"{self.scene.name}/{self.method}"
 
     @property
@@ -215,7 +225,7 @@ class RunRequest:
 
     @property
     def known(self) -> dict[str, str]:
-        """Return the values of the known columns of its row in /runs."""
+        """Return the values of the known columns of the run's row in /runs, by name."""
         method = find_method(self.method)
         settings = method.chosen(self.scene, self.settings).as_dict()
         return {
@@ -228,11 +238,11 @@ class RunRequest:
 
 
 def metric_columns(outputs: Iterable[str]) -> dict[str, Column]:
-    """Return the computed columns of /runs for scenes with these outputs.
+    """Return the computed columns of /runs, by name.
 
     Parameters
     ----------
-    outputs : names of outputs of scenes.
+    outputs : names of the outputs of all scenes in the file.
     """
     columns = columns_in(RUNS)
     for quantity in quantities(outputs):
@@ -263,12 +273,13 @@ def arrays_of(run: RunRequest) -> dict[str, Column]:
 
     Parameters
     ----------
-    run : the request; what is stored depends on the scene's outputs and the method.
+    run : the request. The outputs of its scene and its method decide which arrays are stored.
     """
     method = find_method(run.method)
     outputs = run.scene.outputs
     if run.method == REFERENCE:
-        # A reference is read back by its angles and rates, whatever the scene asks for.
+        # Angles and rates of a reference are always stored, as it is rebuilt from them when it is
+        # read.
         outputs = (*outputs, "angles", "rates")
     columns = {}
     for quantity in quantities(outputs):
@@ -286,11 +297,11 @@ def arrays_of(run: RunRequest) -> dict[str, Column]:
 
 
 def known_columns(rows: Sequence[Mapping[str, object]]) -> dict[str, tuple[Column, Any]]:
-    """Return the `known` columns of a table.
+    """Return the known columns of a table and their values, by name.
 
     Parameters
     ----------
-    rows : texts and numbers by name; all rows have the same names.
+    rows : for each row its texts and numbers by name; all rows have the same names.
     """
     columns: dict[str, tuple[Column, Any]] = {}
     for name, (units, long_name) in DESIGN_COLUMNS.items():
@@ -303,12 +314,13 @@ def known_columns(rows: Sequence[Mapping[str, object]]) -> dict[str, tuple[Colum
 
 
 def scene_scales(scene: Scene, columns: Iterable[Column]) -> dict[str, tuple[Column, Any]]:
-    """Return the scales of a table over a scene's samples, as part of its `known` columns.
+    """Return the scales of a table of a scene's samples, which are part of its known columns.
 
     Parameters
     ----------
     scene : the scene.
-    columns : of the table; the scales of their dimensions are returned, and that of time.
+    columns : columns of the table. The scales of their dimensions are returned, and always that of
+        time.
     """
     used = {"time"}.union(*(column.dimensions for column in columns))
     values = scale_values(scene)
@@ -326,7 +338,7 @@ def scene_scales(scene: Scene, columns: Iterable[Column]) -> dict[str, tuple[Col
 
 
 def runs_table(requests: Sequence[RunRequest]) -> TableSpec:
-    """Return the table /runs of a file with these runs."""
+    """Return the table /runs of a file that has the requested runs."""
     outputs = dict.fromkeys(output for run in requests for output in run.scene.outputs)
     known = known_columns([run.known for run in requests])
     return TableSpec(
@@ -343,8 +355,8 @@ def scene_table(runs: Sequence[RunRequest], arrays: Collection[str] | None = Non
 
     Parameters
     ----------
-    runs : all of one scene.
-    arrays : names of the arrays that are stored, by default all.
+    runs : requests, all for the same scene.
+    arrays : names of the arrays that are stored, by default all that the runs have.
     """
     scene = runs[0].scene
     computed = {}
@@ -370,7 +382,7 @@ def scene_table(runs: Sequence[RunRequest], arrays: Collection[str] | None = Non
 
 
 def results_tables(requests: Sequence[RunRequest]) -> list[TableSpec]:
-    """Return all tables of a file with these runs: /runs, then the arrays of each scene."""
+    """Return all tables of a file that has the requested runs: /runs, then a table per scene."""
     requests = sorted(requests, key=lambda run: row_order(run.label))
     by_scene: dict[str, list[RunRequest]] = {}
     for run in requests:
@@ -382,13 +394,13 @@ def results_tables(requests: Sequence[RunRequest]) -> list[TableSpec]:
 
 
 def row_order(run: str) -> tuple[Any, ...]:
-    """Return a sort key of the label of a run.
+    """Return the key by which runs are sorted, from the label of a run.
 
-    Scenes are in natural order. In each scene the reference comes first, then come the methods in
+    Scenes are in natural order. In each scene the reference comes first, and the methods follow in
     the order of the catalogue.
     """
     parts = run.split("/")
-    # A method is model/integrator, but the reference has a name without a model.
+    # The name of a method is model/integrator; that of the reference has no model.
     count = 1 if parts[-1] == REFERENCE else 2
     scene, method = "/".join(parts[:-count]), "/".join(parts[-count:])
     names = [REFERENCE, *method_names()]

@@ -1,7 +1,7 @@
 """Compute rows of a table: send tasks to worker processes, and write their rows to the file.
 
-A run passes through `run_tasks_references_first`, `run_tasks`, `pool.run_in` and `TaskPool.submit`
-here, and in the worker process through `run_in_worker` and `RunTask.perform`.
+The parent process calls `run_tasks_references_first`, `run_tasks`, `pool.run_in` and
+`TaskPool.submit` for a run. The worker process then calls `run_in_worker` and `RunTask.perform`.
 """
 
 from __future__ import annotations
@@ -20,27 +20,28 @@ from rotor_mbs.processes.pool import TaskEnd, TaskPool, run_in
 from rotor_mbs.runs.rows import RowLocation, Rows
 from rotor_mbs.solution.status import REFUSED
 
-# Columns that a worker returns of rows that it has written.
+# Columns that a worker returns after it has written all columns into the file itself.
 _REPORTED = ("status", "message", "run_time_s")
 
 
 @dataclass(frozen=True)
 class RunOutcome:
-    """The outcome of a run, or of other rows of a study.
+    """The outcome of a run, or of another part of a study such as a curve of a bench.
 
-    They were computed by this call, could not be computed, or were stored before.
+    The call has computed the run, could not compute it, or found it in the file.
 
     Attributes
     ----------
-    label, method : of the run; the label begins with the name of the scene and a space.
-    status : of a run; "measured" for other rows. If nothing is stored, the failure: REFUSED if the
-        method refused the scene, "no_reference", or that of a `TaskEnd`.
-    message : the reason of the status, if there is one.
+    label : label for messages, which begins with the name of the scene and a space.
+    method : name of the method.
+    status : status of a run; "measured" for another part of a study. If nothing is stored, the kind
+        of failure: REFUSED if the method refused the scene, "no_reference", or `TaskEnd.failure`.
+    message : reason of the status, or a count of points; "" if there is neither.
     seconds : run time in s; NaN if nothing was timed.
-    is_stored : whether there is a row; if not, the same call tries again.
-    is_computed : whether this call computed it, or tried to; if not, it was stored before.
-    is_shipped : whether it was read from a shipped file and not computed.
-    share : part of the work of the call that was done when it ended, from 0 to 1.
+    is_stored : whether the file has the row. If it has not, a repeated call tries again.
+    is_computed : whether this call computed the run, or tried to. If not, it was stored before.
+    is_shipped : whether the run is a reference that was read from a shipped file.
+    share : share of the call's whole work that was done when this run ended, from 0 to 1.
     """
 
     label: str
@@ -55,14 +56,14 @@ class RunOutcome:
 
     @property
     def scene(self) -> str:
-        """Return the name of its scene."""
+        """Return the name of the scene."""
         return self.label.partition(" ")[0]
 
     @property
     def has_failed(self) -> bool:
         """Return whether the stored run should have succeeded and did not.
 
-        The printed equations cannot fail: how far their runs get is a result.
+        Runs of the printed equations never count as failed: how far they get is a result.
         """
         return self.is_stored and self.status != "ok" and is_corrected(self.method)
 
@@ -80,10 +81,12 @@ class Task(ABC):
 
     Attributes
     ----------
-    label, method : of the line of progress.
+    label : label for the line of progress.
+    method : name of the method; "" if the task has several.
     place : location of the rows in the file.
-    reference : location of the row that must be stored before this task is computed.
-    kill_after_s : time in s after which the process is ended, if it has not ended the task itself.
+    reference : location of the reference's row, which must be stored before this task is computed;
+        None if the task needs no reference.
+    kill_after_s : time in s after which the worker process is ended, if the task still runs.
     work : rough amount of work, relative to that of other tasks.
     """
 
@@ -96,7 +99,7 @@ class Task(ABC):
 
     @property
     def first(self) -> int:
-        """Return the number of the first row, the initial value of its checksum."""
+        """Return the number of the first row, with which the checksum of that row begins."""
         return self.place.first
 
     @abstractmethod
@@ -108,18 +111,18 @@ class Task(ABC):
         self.place.write(rows)
 
     def split(self) -> Sequence[Self]:
-        """Return a task for each row; none if there is only one row, or they cannot be split."""
+        """Return smaller tasks that compute the same rows; none if this task cannot be split."""
         return ()
 
     def failed(self, status: str, message: str) -> Rows | None:  # noqa: ARG002
-        """Return the rows of a task that was ended or raised an error.
+        """Return the rows that are stored if this task was ended or raised an error.
 
-        None means that nothing is stored, so that the task is tried again.
+        If None is returned, nothing is stored, and the next call tries the task again.
         """
         return None
 
     def outcome(self, rows: Rows) -> RunOutcome:
-        """Return the outcome of the task, from what `run_tasks` yields of its rows."""
+        """Return the outcome of the task; `rows` are the columns that `run_tasks` yields."""
         return RunOutcome(self.label, self.method, "measured", f"{len(rows['status'])} points")
 
 
@@ -129,25 +132,26 @@ T = TypeVar("T", bound=Task)
 def run_tasks(pool: TaskPool, tasks: Iterable[T]) -> Iterator[TaskEnd[T, Rows]]:
     """Compute tasks in a pool and store their rows.
 
-    The worker stores them if it sees the file, otherwise this process. However the loop ends, the
-    rows of all tasks that have ended are in the file.
+    The worker writes the rows if it sees the file; otherwise this process writes them. The rows of
+    a task are in the file before its end is yielded.
 
     Parameters
     ----------
     pool : a pool that is open.
-    tasks : taken as workers become free.
+    tasks : the tasks; further ones are taken as workers become free.
 
     Yields
     ------
     TaskEnd
-        Its `value` has at least the columns `status` and `message` of the stored rows, and their
-        run time if there is one; a failure can be stored, too. If nothing is stored, `value` is
-        None, and `failure` and `message` say why: REFUSED if the method refused the scene.
+        The end of each task. Its `value` has at least the columns `status` and `message` of the
+        stored rows, and `run_time_s` if the rows have it. Rows can also be stored for a task that
+        failed. If nothing is stored, `value` is None, and `failure` and `message` give the reason;
+        `failure` is REFUSED if the method refused the scene.
 
     Raises
     ------
     InputError, StoreError
-        If a task raised it.
+        If a task raised such an error, or the rows cannot be written.
     """
     work = with_method_files(partial(run_in_worker, stores=pool.shares_disk))
     for end in run_in(pool, work, tasks, lambda task: task.kill_after_s, lambda task: task.split()):
@@ -163,7 +167,7 @@ def run_tasks(pool: TaskPool, tasks: Iterable[T]) -> Iterator[TaskEnd[T, Rows]]:
             yield end
             continue
         status = "solver_failed" if end.failure == "error" else end.failure
-        # A process may have died for reasons of the machine: nothing is stored, and the next call
+        # If a process died, the machine may be the cause: nothing is stored, and the next call
         # tries again.
         rows = None if end.failure == "worker_died" else task.failed(status, end.message)
         if rows is not None:
@@ -174,8 +178,8 @@ def run_tasks(pool: TaskPool, tasks: Iterable[T]) -> Iterator[TaskEnd[T, Rows]]:
 def run_in_worker(task: Task, *, stores: bool) -> Rows:
     """Compute the rows of a task in a worker process, and return them.
 
-    With `stores` they are written into the file, and only the columns that are reported are
-    returned.
+    If `stores` is set, the rows are written into the file here, and only the columns in _REPORTED
+    are returned.
     """
     rows = task.perform()
     if not stores:
@@ -189,20 +193,20 @@ def run_tasks_references_first(
 ) -> list[RunOutcome]:
     """Compute references first, then all other tasks whose reference is stored.
 
-    Of these, slow and fast ones take turns.
+    The slowest of the other tasks start first, in turns with the fastest.
 
     Parameters
     ----------
-    tasks : in any order.
+    tasks : the tasks, in any order.
     pool : a pool that is open.
     on_progress : called after each task with the number of tasks that have ended, the number of
-        all, and the outcome.
+        all tasks, and the outcome.
 
     Returns
     -------
     list of RunOutcome
-        The outcome of each task, in the order in which they ended; those whose reference is missing
-        are last.
+        The outcomes in the order in which the tasks ended. Tasks that were not computed because
+        their reference is missing come last.
     """
     outcomes: list[RunOutcome] = []
     total_work = sum(task.work for task in tasks)
@@ -232,9 +236,10 @@ def run_tasks_references_first(
             ready.append(task)
         else:
             without_reference.append(task)
-    # The slowest tasks come first: one that started last would keep one process busy while the
-    # others wait. They take turns with the fastest, whose methods compile code when they start, so
-    # that two processes seldom compile the same code at once.
+    # The slowest tasks start first: a slow task that started last would keep one process busy while
+    # the other processes are idle. The fastest tasks start in turns with them. The methods of fast
+    # tasks compile code when they start, and in turns two processes seldom compile the same code at
+    # once.
     ready.sort(key=lambda task: -task.work)
     quarter, count = len(ready) // 4, len(ready)
     ordered: list[Task] = []

@@ -43,11 +43,12 @@ from rotor_mbs.solution.status import STATUSES
 from rotor_mbs.solution.trajectory import Integration, Solution, Trajectory
 from rotor_mbs.studies.stored_references import frozen_solution, read_reference, shipped_versions
 
-# Short runs are repeated, so that the stored time is not that of a cold cache; long ones are not.
+# A short run is repeated up to _REPEATS times within _REPEAT_BUDGET_S (s), so that its median time
+# is not that of a cold cache. A run that takes more than half this budget is not repeated.
 _REPEATS = 5
 _REPEAT_BUDGET_S = 0.05
-_JUDGING_S = 1.0  # s that are always left to judge a run, also after the time limit
-_FIXED_WORK = 3.0  # of building, judging and storing a run, see `work_of`
+_JUDGING_S = 1.0  # s that judging a run may always take, even after the time limit of the run
+_FIXED_WORK = 3.0  # work of building, judging and storing a run, in the unit of `work_of`
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,15 +57,15 @@ class RunTask(Task):
 
     Attributes
     ----------
-    request : the run.
-    time_limit_s : s, after which the run ends itself.
+    request : the run that is requested.
+    time_limit_s : time limit of the run in s, at which the run stops itself.
     """
 
     request: RunRequest
     time_limit_s: float
 
     def failed(self, status: str, message: str) -> Rows:
-        """Return the row of the run without samples, with a status and its reason."""
+        """Return the row that is stored if the run fails: no samples, a status and its reason."""
         request = self.request
         run = without_samples(request.scene, request.method, request.settings, status, message)
         limit = self.time_limit_s if status == "timed_out" else np.nan
@@ -73,13 +74,15 @@ class RunTask(Task):
     def perform(self) -> Rows:
         """Solve and judge the run, and return its row.
 
-        A shipped reference is read in place of being computed. What a method raises becomes the
-        status of the run.
+        A shipped reference is read instead of computed. An error of the method is not raised, apart
+        from those below: it becomes the status of the run.
 
         Raises
         ------
         MethodRefusal
             If the method cannot represent the scene.
+        Exception
+            One of SYSTEM_ERRORS, for example if the system lacks memory.
         """
         request = self.request
         end = time.monotonic() + self.time_limit_s
@@ -126,14 +129,14 @@ class RunTask(Task):
 
 
 def work_of(scene: Scene, method: str) -> float:
-    """Return a rough measure of how much there is to compute, to share runs among processes.
+    """Return the rough amount of work of a run, by which tasks and progress are planned.
 
-    The integration of 10 s of a scene by the fastest method counts as 1; a constant for building,
-    judging and storing is added.
+    The integration of 10 s of a scene by the fastest method counts as 1. A constant is added for
+    building, judging and storing.
 
     Parameters
     ----------
-    scene, method : what is run.
+    scene, method : the scene, and the name of the method.
     """
     return _FIXED_WORK + find_method(method).relative_cost * scene.duration / 10.0
 
@@ -152,29 +155,33 @@ def run_scenes(
 ) -> list[RunOutcome]:
     """Compute references and runs, and store them in a results file.
 
-    Rows that the file has already are kept. A requested row is computed again if its settings, its
-    versions or the numbers of its scene differ, and in the cases that `missing_runs` names.
+    Rows that the file already has are kept. A requested row is computed again if its settings, its
+    versions or the numbers of its scene differ from the stored ones, and in the cases that
+    `missing_runs` lists.
 
     Parameters
     ----------
     scenes : the scenes.
     methods : names of methods by scene name.
     output : the results file.
-    workers : parallel processes, or a pool that is open; 0: all in this process.
-    timeout_s : s; a run over this ends itself, and is stored with the status timed_out.
-    settings : of the methods that have them, in place of defaults and of the scene's own.
-    use_frozen : whether a shipped reference may stand for a computed one.
+    workers : number of parallel processes, or a pool that is open; with 0, this process computes
+        all runs.
+    timeout_s : time limit of a run in s. A run that exceeds it stops itself, and is stored with the
+        status timed_out.
+    settings : settings of methods by name. They override the defaults and the scene's own settings;
+        each applies to the methods that have it.
+    use_frozen : whether a shipped reference, if there is one, is read instead of computed.
     on_progress : called after each run.
 
     Returns
     -------
     list of RunOutcome
-        The runs that this call computed, or tried to, then those that were stored before.
+        The runs that this call computed or tried to compute, then the runs that were stored before.
 
     Raises
     ------
     InputError, StoreError, KeyboardInterrupt
-        After any of them the call can be repeated, and continues where this one stopped.
+        Runs that ended before the error stay in the file, and a repeated call computes the others.
     """
     requests = requested_runs(scenes, methods, settings or {}, use_frozen=use_frozen)
     with locked(output), pool_of(workers) as pool:
@@ -190,22 +197,23 @@ def requested_runs(
     *,
     use_frozen: bool = True,
 ) -> list[RunRequest]:
-    """Return the runs of these scenes, the reference of each scene before its runs.
+    """Return the runs of these scenes; the reference of a scene precedes its other runs.
 
-    The reference is the shipped one, where there is one and it may be used, else one to be
-    computed.
+    The reference is the shipped one if there is one and `use_frozen` is set. Otherwise the
+    reference is to be computed.
 
     Parameters
     ----------
     scenes : the scenes.
     methods : names of methods by scene name.
-    settings : of the methods that have them, in place of defaults and of the scene's own.
+    settings : settings of methods by name. They override the defaults and the scene's own settings;
+        each applies to the methods that have it.
     use_frozen : whether a shipped reference may be used.
 
     Raises
     ------
     InputError
-        For unknown methods, and settings of a scene that no method has.
+        If a method is unknown, or a scene has a setting that no method has.
     """
     requests: list[RunRequest] = []
     for scene in scenes:
@@ -219,7 +227,7 @@ def requested_runs(
 def missing_runs(
     file: TableFile, requests: Sequence[RunRequest], timeout_s: float
 ) -> tuple[list[RunTask], list[RunOutcome]]:
-    """Return which runs are to be computed, and mark their rows in the file as missing.
+    """Return the runs that are to be computed, and mark their rows in the file as missing.
 
     Parameters
     ----------
@@ -230,23 +238,24 @@ def missing_runs(
     Returns
     -------
     tasks : list of RunTask
-        Of the runs that are not stored, that a shorter time limit ended, or whose reference is
-        computed.
+        A task for each run that is not stored, that a shorter time limit ended, or whose reference
+        is to be computed.
     stored : list of RunOutcome
-        Of the other runs, which stay as they are.
+        The outcome of each other run. The row of such a run stays as it is.
     """
     tasks: list[RunTask] = []
     stored: list[RunOutcome] = []
-    references: dict[str, RowLocation] = {}  # by label
+    references: dict[str, RowLocation] = {}  # by label of the reference
     new_references = set[str]()
     for run in requests:
         place = file.place(run.label)
         row = place.read()
         status = STATUSES[row["status"][0]] if place.is_stored else ""
-        # The time limit that ended the stored run; NaN if none did. A run that ended timed_out is
-        # computed again unless this limit was at least as long as the present one. A shipped
-        # reference has a limit only if it took too long to read. A shipped one that was itself
-        # ended early has NaN, and is not read again: it would be as short.
+        # `limit` is the time limit that ended the stored run, or NaN. A run with the status
+        # timed_out is computed again unless `limit` is at least the present time limit. A row with
+        # a shipped reference has a `limit` only if the reference took too long to read. If its
+        # computation was ended early before it was shipped, the status is timed_out, too, but
+        # `limit` is NaN. It is then not read again, as it would end at the same sample.
         limit = row["time_limit_s"][0]
         is_short = not limit >= timeout_s
         if run.is_shipped:
@@ -272,8 +281,8 @@ def missing_runs(
                 method=run.method,
                 place=place,
                 reference=reference,
-                # A run that ends itself at its time limit also needs time to load its engine and
-                # compile before, and to write its row after.
+                # The process is ended later than the run stops itself, because it also loads the
+                # engine, compiles code and writes the row.
                 kill_after_s=1.2 * timeout_s + 10.0,
                 work=work_of(run.scene, run.method),
                 request=run,
@@ -294,24 +303,24 @@ def solve_judged(
 ) -> tuple[Solution, Trajectory | None]:
     """Solve and judge one run in this process; nothing is stored.
 
-    The run, the reference and the judging share the time limit, in this order.
-
     Parameters
     ----------
-    scene, method, settings : what is run.
-    compute_reference : whether a reference is computed where none is shipped.
-    time_limit_s : s.
+    scene, method : the scene, and the name of the method.
+    settings : settings of the method, which override the scene's own settings.
+    compute_reference : whether a reference is computed if none is shipped.
+    time_limit_s : time limit in s of the whole call: first of the run, then of the reference, then
+        of the judging.
 
     Returns
     -------
     Solution
         The run, with status, message and metrics.
     Trajectory or None
-        The reference it was judged by.
+        The reference by which the run was judged, if there is one.
 
     Notes
     -----
-    Errors raised and an example: `rotor_mbs.run`.
+    `rotor_mbs.run` lists the errors raised, and has an example.
     """
     end = time.monotonic() + time_limit_s
     shipped = frozen_solution(scene)
@@ -340,13 +349,15 @@ def solve_judged(
 
 
 def _judged(run: Solution, reference: Trajectory | None, end: float) -> tuple[Solution, bool]:
-    """Return a run with status, message and metrics, and whether its report of success is false.
+    """Judge a run: return it with status, message and metrics, and whether its success is false.
+
+    A success is false if the engine reports it although the samples are wrong.
 
     Parameters
     ----------
     run : a run as its method returned it.
-    reference : of its scene; None without one.
-    end : time limit on the monotonic clock, s. After it there is one second left to judge a run.
+    reference : the reference of the scene; None if there is none.
+    end : end of the time limit on the monotonic clock (s). Judging may always take _JUDGING_S.
     """
     try:
         with time_limit(max(end - time.monotonic(), _JUDGING_S)):
@@ -370,9 +381,9 @@ def _judged(run: Solution, reference: Trajectory | None, end: float) -> tuple[So
 
 
 def _with_defects(samples: Trajectory, defects: Defects) -> Trajectory:
-    """Return the samples with the size of the defect of the interval that ends at each of them.
+    """Return the samples with defects: each sample has the defect of the interval that ends there.
 
-    It is NaN at the first sample, and where the defect is not finite.
+    The size of the defect is stored. It is NaN at the first sample, and where it is not finite.
     """
     sizes = np.concatenate([[np.nan], defects.sizes])
     with_defects = samples.replace(**{DEFECT: np.where(np.isfinite(sizes), sizes, np.nan)})
@@ -381,16 +392,16 @@ def _with_defects(samples: Trajectory, defects: Defects) -> Trajectory:
 
 
 def next_to_try(scene: Scene, method: str, settings: Mapping[str, object], status: str) -> str:
-    """Return a text on what would improve an inaccurate run; "" if nothing is known.
+    """Return advice on an inaccurate run, as text: finer settings or another method; "" for none.
 
-    That is the next rung of the method's ladder, or another method. Nothing is proposed for a
-    reference, which no other method can replace.
+    The finer settings are the next rung of the method's ladder. There is no advice on a reference,
+    which no other method can replace, nor on a run of the printed equations.
 
     Parameters
     ----------
-    scene : the scene; steps of a ladder are at most its interval between samples.
-    method, settings : of the run.
-    status : of the run; only "inaccurate" gives a proposal.
+    scene : the scene. Its interval between samples is the largest step of a ladder.
+    method, settings : method and settings of the run.
+    status : status of the run; there is advice only for "inaccurate".
     """
     known = find_method_or_none(method)
     if status != "inaccurate" or known is None or not known.is_corrected or method == REFERENCE:
@@ -407,18 +418,18 @@ def next_to_try(scene: Scene, method: str, settings: Mapping[str, object], statu
 def without_samples(
     scene: Scene, method: str, settings: Mapping[str, object], status: str, message: str
 ) -> Solution:
-    """Return a run without samples, whose engine reports failure.
+    """Return a run that has no samples, and an engine's report of failure.
 
     Parameters
     ----------
-    scene, method, settings : what was to be run.
-    status, message : the outcome and its reason.
+    scene, method, settings : the run that was requested.
+    status, message : the status of the run and its reason.
     """
     columns = 1 + len(scene.blades)
     trajectory = Trajectory(np.empty(0), np.empty((0, columns)), np.empty((0, columns)))
     chosen = find_method(method).settings.of(method, settings).as_dict()
     engine = Integration(False, message)
-    # Times are not known: its process may have been ended.
+    # The times of the run are unknown (NaN), as its process may have been ended.
     return Solution(
         scene, method, trajectory, engine, chosen, math.nan, [], math.nan, status, message
     )
