@@ -1,7 +1,7 @@
-"""Read attributes, columns and values of groups with the HDF5 library, but not the rows.
+"""Read files of this program with the HDF5 library: groups and known columns, but not the rows.
 
-The files are of this program. The worker process of `runs.untrusted` loads this module; it imports
-little, so that the worker starts fast.
+The worker process of `runs.untrusted` loads this module. The module imports little, so that the
+worker starts fast.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from rotor_mbs.errors import RotorError, StoreError, one_line
 from rotor_mbs.runs.trailer import Trailer, read_trailer, refuse_split
 from rotor_mbs.runs.untrusted import read_in_worker
 
-CHARACTERS = "characters"  # the dimension of texts that are filled in later
-# The netCDF-4 library's name for the scale of a dimension without values.
+CHARACTERS = "characters"  # name of the dimension of computed texts over their bytes
+# Text with which the netCDF-4 library begins the name of a dimension that has no values.
 WITHOUT_VALUES = "This is a netCDF dimension but not a netCDF variable."
 # Attributes that the HDF5 and netCDF-4 libraries write for themselves.
 _LIBRARY_ATTRIBUTES = (
@@ -33,13 +33,14 @@ _LIBRARY_ATTRIBUTES = (
     "_Netcdf4Dimid",
     "_Netcdf4Coordinates",
 )
-# How a dataset stores a text of variable length: its length, and where it is in the file's heap.
+# Element of a dataset of texts of variable length: the length of a text, and its location in the
+# file's heap.
 _REFERENCE = np.dtype([("length", "<u4"), ("heap", "<u8"), ("index", "<u4")])
-# Texts of variable length: for NumPy, and as the library has them in memory and in a file.
+# Types of texts of variable length: of NumPy, of the library in memory, of the library in a file.
 TEXT = h5py.string_dtype()
 TEXT_IN_MEMORY = h5py.h5t.py_create(TEXT)
 TEXT_TYPE = h5py.h5t.py_create(TEXT, logical=True)
-ATTEMPTS = 3  # to open a file that is being replaced
+ATTEMPTS = 3  # number of attempts to open a file that is being replaced
 
 
 class Column(NamedTuple):
@@ -47,9 +48,9 @@ class Column(NamedTuple):
 
     Attributes
     ----------
-    dimensions : names of the scales of its axes; the dimension of a scale is the scale itself.
-    units, long_name : its unit and its meaning.
-    kind : type of its values in the file.
+    dimensions : name of the scale of each axis; a scale has its own name here.
+    units, long_name : unit and meaning of the values.
+    kind : NumPy type of the values in the file.
     attributes : further attributes, by name.
     """
 
@@ -62,19 +63,20 @@ class Column(NamedTuple):
 
 @dataclass(frozen=True)
 class TableSpec:
-    """A table without its rows, as it is to be laid out, or a group of a file as it is read.
+    """A table without its computed values, before it is laid out or after it is read.
+
+    It also describes a group that is no table. Such a group has no runs, and all its columns are
+    known.
 
     Attributes
     ----------
-    group : its path in the file; "" for the root.
-    runs : (rows,) unique labels or numbers of the rows: the scale of the dimension `run`. A group
-        that is no table has none, and all its columns are known.
-    known : column and values by name: the known columns of the rows, and the scales of the
-        dimensions other than `run`.
+    group : path of the group in the file; "" for the root.
+    runs : (rows,) unique labels or numbers of the rows: the scale of the dimension `run`.
+    known : column and values by name, for the known columns and for all scales except `run`.
     computed : columns that are filled in later, in the order in which the checksum of a row covers
-        them. A column without the dimension `run` belongs to the reference.
-    attributes : of the group.
-    characters : length of each computed text.
+        them. A column without the dimension `run` belongs to the row of the reference.
+    attributes : attributes of the group.
+    characters : length of each computed text in bytes.
     """
 
     group: str
@@ -103,9 +105,9 @@ class TableSpec:
 
     @functools.cached_property
     def known_rows(self) -> Mapping[str, Mapping[str, Any]]:
-        """Return, for the label of each row, its known values by column.
+        """Return the known values of each row by column, by the label of the row.
 
-        It is for tables whose known columns all have the dimension `run`.
+        The table must have no scale except `run`: all its known columns have one value per row.
         """
         columns = {name: list(values) for name, (_, values) in self.known.items()}
         rows = {}
@@ -115,48 +117,49 @@ class TableSpec:
 
     @functools.cached_property
     def row_of(self) -> Mapping[str, int]:
-        """Return the number of each row, by its label."""
+        """Return the number of each row, by the label of the row."""
         return {str(run): row for row, run in enumerate(self.runs)}
 
 
 def read_groups(
     path: Path, kinds: Collection[str], only: Collection[str] | None = None
 ) -> tuple[dict[str, TableSpec], Trailer]:
-    """Read a file of this program, in the worker process unless the file is trusted.
+    """Read groups of a file of this program, in the worker process unless the file is trusted.
 
     Parameters
     ----------
     path : the file.
-    kinds : of files whose groups are read; of a file of another kind it is the root alone.
+    kinds : kinds of files whose groups are read. Only the root is read of a file of another kind.
     only : names of the groups to read beside the root, by default all.
 
     Returns
     -------
     dict of TableSpec
-        By name; "" is the root.
+        The groups by name; "" is the root.
     Trailer
-        Of the file, with all its groups and the locations of the computed columns.
+        The trailer of the file, with all groups and the locations of the computed columns.
 
     Raises
     ------
     StoreError
-        If it is missing, damaged or another program's, or cannot be read within limits.
+        If the file is missing, damaged or another program's, or cannot be read within limits.
     """
     return read_in_worker(path, _read_groups, (kinds, only))
 
 
 def read_arrays(path: Path, group: str, names: Collection[str]) -> dict[str, NDArray[Any]]:
-    """Read a few arrays of a file of this program, as `read_groups` reads whole groups.
+    """Read arrays of a file of this program, in the worker process unless the file is trusted.
 
     Parameters
     ----------
     path : the file.
-    group, names : path of a group, and names of its arrays.
+    group : path of a group.
+    names : names of arrays in the group.
 
     Raises
     ------
     StoreError
-        As `read_groups`, or if one of them is missing.
+        In the cases of `read_groups`, or if an array is missing.
     """
     return read_in_worker(path, _read_arrays, (group, names))
 
@@ -170,7 +173,7 @@ def _read_arrays(path: Path, asked: tuple[str, Collection[str]]) -> dict[str, ND
 def _read_groups(
     path: Path, selection: tuple[Collection[str], Collection[str] | None]
 ) -> tuple[dict[str, TableSpec], Trailer]:
-    """Read a file in this process; `selection` is (kinds, only), see `read_groups`."""
+    """Read groups of a file in this process; `selection` is (kinds, only), see `read_groups`."""
     kinds, only = selection
     with open_file(path) as (file, trailer), reading(path):
         groups = {"": _read_group(file, "", trailer.groups.get("", {}))}
@@ -181,12 +184,15 @@ def _read_groups(
 
 
 def _read_group(group: Any, path: str, regions: Mapping[str, tuple[int, int]]) -> TableSpec:
-    """Read a group, but not the columns in `regions`, which must be where these say.
+    """Read a group, but not the values of its computed columns.
+
+    The computed columns must be at the locations that the trailer gives; otherwise StoreError is
+    raised.
 
     Parameters
     ----------
     group, path : an h5py.Group, and its path in the file.
-    regions : offset and length of each computed column, as the trailer has them.
+    regions : offset and length of each computed column in bytes, from the trailer.
     """
     datasets = datasets_of(group)
     columns = columns_of(datasets)
@@ -208,7 +214,7 @@ def _read_group(group: Any, path: str, regions: Mapping[str, tuple[int, int]]) -
 
 @contextmanager
 def open_file(path: Path) -> Iterator[tuple[Any, Trailer]]:
-    """Open a file of this program for reading, after its trailer was checked.
+    """Check the trailer of a file of this program, then open the file for reading.
 
     Parameters
     ----------
@@ -228,7 +234,7 @@ def open_file(path: Path) -> Iterator[tuple[Any, Trailer]]:
         trailer = read_trailer(path)
         try:
             file = h5py.File(path, "r")
-        except FileNotFoundError:  # removed since it was checked
+        except FileNotFoundError:  # the file was removed after its trailer was checked
             continue
         except OSError as exc:
             raise StoreError(
@@ -238,9 +244,9 @@ def open_file(path: Path) -> Iterator[tuple[Any, Trailer]]:
         with file:
             try:
                 inode = path.stat().st_ino
-            except FileNotFoundError:  # removed since it was checked
+            except FileNotFoundError:  # the file was removed after its trailer was checked
                 continue
-            if inode != trailer.inode:  # replaced since it was checked
+            if inode != trailer.inode:  # the file was replaced after its trailer was checked
                 continue
             refuse_split(path, trailer.kind)
             yield file, trailer
@@ -250,14 +256,14 @@ def open_file(path: Path) -> Iterator[tuple[Any, Trailer]]:
 
 @contextmanager
 def reading(path: Path | str, what: str = "") -> Iterator[None]:
-    """Turn an error that the content of a file causes in the block into a StoreError.
+    """Raise errors that the content of a file causes in the block as StoreError.
 
-    HDF5 raises errors of many types on damaged files, and so does code that uses the content of a
-    forged file with a right digest.
+    HDF5 raises errors of many types on damaged files. A forged file with a right digest may cause
+    such errors, too, in the code that uses its content.
 
     Parameters
     ----------
-    path, what : the file, and the part of it, for the message.
+    path, what : the file, and the part of the file, for the message.
     """
     try:
         yield
@@ -297,12 +303,12 @@ def values_of(dataset: Any) -> NDArray[Any]:
     Returns
     -------
     ndarray
-        Texts have the type object.
+        The values. Texts are in an array of dtype object.
 
     Raises
     ------
     StoreError
-        If it is no array, not contiguous in this file, or claims far more than the file holds.
+        If `dataset` is no array, is not contiguous in this file, or claims more than the file has.
     """
     place = f"{dataset.file.filename}: {dataset.name}"
     if not isinstance(dataset, h5py.Dataset) or dataset.shape is None:
@@ -320,8 +326,9 @@ def values_of(dataset: Any) -> NDArray[Any]:
         return values
     if h5py.check_string_dtype(dataset.dtype) is None:
         raise StoreError(f"{place} is no array")
-    # Each text is stored as a reference with a length, and all references may lead to one text: the
-    # sum of the lengths is limited before they are read.
+    # The dataset has a reference to each text, with the length of the text. In a forged file all
+    # references may lead to the same long text, so the sum of the lengths is limited before the
+    # texts are read.
     if dataset.size:
         texts = np.memmap(
             dataset.file.filename, _REFERENCE, "r", dataset.id.get_offset(), dataset.shape
@@ -343,7 +350,7 @@ def plain(value: Any) -> Any:
 def attributes_of(target: Any) -> dict[str, Any]:
     """Return the attributes of a group or dataset as plain Python values.
 
-    Those that the HDF5 library writes itself are left out.
+    Attributes that the HDF5 and netCDF-4 libraries write for themselves are left out.
     """
     return {
         name: attribute(target, name) for name in target.attrs if name not in _LIBRARY_ATTRIBUTES
@@ -353,19 +360,19 @@ def attributes_of(target: Any) -> dict[str, Any]:
 def attribute(target: Any, name: str, default: Any = None) -> Any:
     """Return an attribute as a plain Python value.
 
-    In a damaged file a text may have become a list of any type, which would end the process if it
-    were read.
+    In a damaged file the type of a text may be changed to a list of variable length. The library
+    would end the process if it read such an attribute, so ValueError is raised instead.
 
     Parameters
     ----------
     target : a file, group or dataset.
-    name : of the attribute.
-    default : returned if there is none.
+    name : name of the attribute.
+    default : returned if there is no such attribute.
 
     Raises
     ------
     ValueError
-        If its type is one that no attribute has.
+        If the attribute is a list of variable length.
     """
     if not h5py.h5a.exists(target.id, name.encode()):
         return default
@@ -373,7 +380,7 @@ def attribute(target: Any, name: str, default: Any = None) -> Any:
     kind = stored.get_type()
     if isinstance(kind, h5py.h5t.TypeVlenID):
         raise ValueError(f"attribute {name} is neither a number nor a text")
-    # Nearly all attributes are single texts, which the general way reads three times slower.
+    # Nearly all attributes are single texts. `attrs` of h5py takes three times as long for them.
     if isinstance(kind, h5py.h5t.TypeStringID) and kind.is_variable_str() and stored.shape == ():
         text = np.empty((), TEXT)
         stored.read(text, mtype=TEXT_IN_MEMORY)
@@ -382,7 +389,7 @@ def attribute(target: Any, name: str, default: Any = None) -> Any:
 
 
 def datasets_of(group: Any) -> dict[str, Any]:
-    """Open the datasets of a group that have values, by name."""
+    """Return the open datasets of a group that have values, by name."""
     datasets = {}
     for name in group:
         dataset = member(group, name)
@@ -394,12 +401,12 @@ def datasets_of(group: Any) -> dict[str, Any]:
 def _dimension(dataset: Any, axis: int, name: str, scale_names: dict[int, str]) -> str:
     """Return the name of the scale of an axis of a dataset.
 
-    A dataset without one is a scale, and its own dimension.
+    A dataset without scales is a scale itself, and its own name is returned.
 
     Parameters
     ----------
-    dataset, axis, name : the array, the number of its axis, and its name.
-    scale_names : names of scales by their address in the file; that of this one is added.
+    dataset, axis, name : the dataset, the number of the axis, and the name of the dataset.
+    scale_names : names of the scales found so far, by address in the file; a new one is added.
     """
     scales: list[Any] = []
     if h5py.h5ds.get_num_scales(dataset.id, axis):
@@ -408,8 +415,8 @@ def _dimension(dataset: Any, axis: int, name: str, scale_names: dict[int, str]) 
         return name
     address = h5py.h5o.get_info(scales[0]).addr
     if address not in scale_names:
-        # The name is read from an attribute. The library would search the whole file for the
-        # scale's path, and its function for the name ends the process if the name is damaged.
+        # The name is read from an attribute. To find the scale's path, the library would search the
+        # whole file; and its function for the name ends the process if the name is damaged.
         scale = str(attribute(h5py.Dataset(scales[0]), "NAME"))
         scale_names[address] = CHARACTERS if scale.startswith(WITHOUT_VALUES) else scale
     return scale_names[address]
@@ -431,7 +438,7 @@ def columns_of(datasets: Mapping[str, Any]) -> dict[str, Column]:
         attributes = attributes_of(dataset)
         attributes.pop("_Encoding", None)
         for key, value in attributes.items():
-            # Lists of texts stay lists, numbers arrays: their type is part of the attribute.
+            # A list of texts stays a list. Numbers stay an array, which keeps their type.
             if isinstance(value, list) and not isinstance(value[0], str):
                 attributes[key] = dataset.attrs[key]
         units, long_name = str(attributes.pop("units")), str(attributes.pop("long_name"))
@@ -445,16 +452,16 @@ def is_group(item: Any) -> bool:
 
 
 def reason_of(error: Exception) -> str:
-    """Return the text in brackets of an HDF5 error, such as "file signature not found".
+    """Return the reason that an HDF5 error has in brackets, such as "file signature not found".
 
-    The name of HDF5's function is left out.
+    If there are no brackets, the first line of the error is returned.
     """
     text = str(error).splitlines()[0]
     return text.partition("(")[2].rpartition(")")[0] or text
 
 
 def place_of(dataset: Any) -> tuple[int, int]:
-    """Return offset and length in bytes of the values of a contiguous dataset."""
+    """Return the offset and the length of the values of a contiguous dataset, in bytes."""
     return dataset.id.get_offset() or 0, dataset.nbytes
 
 

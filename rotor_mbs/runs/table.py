@@ -1,17 +1,17 @@
-"""Read the tables of a file: their columns, and where their rows are.
+"""Read the tables of a file: their columns, and the locations of their rows.
 
     /runs                 a row per run of the file: scene, method, settings, status, metrics
     /paper/fig11          the arrays of a scene: dimensions run, time, ...
     /bench, /stability    a row per point
-    /                     of a sweep's file: one table
+    /                     the only table of a sweep's file, with a row per run
 
-All space is taken when a file is laid out (`runs.layout`). From then on no HDF5 metadata changes,
-so that the file is valid and can be read at every moment. The known columns (scene, method,
-settings, versions, see `runs.design`) are written with the layout and covered by the digest in the
-file's trailer (`runs.trailer`); rows of computed columns have checksums (`runs.rows`).
+All space is allocated when a file is laid out (`runs.layout`). No HDF5 metadata changes after that:
+the file is valid and can be read at every moment. The known columns (scene, method, settings,
+versions, see `runs.design`) are written with the layout, and the digest in the file's trailer
+covers them (`runs.trailer`). The computed columns have a checksum per row (`runs.rows`).
 
-An HDF5 handle that is open while rows are written reads old values, and would overwrite the new
-rows with them if it wrote. So the HDF5 library writes nothing after the layout.
+The HDF5 library writes nothing after the layout. A handle of the library that is open while rows
+are written reads old values. If the library wrote, it would overwrite the new rows with these.
 """
 
 from __future__ import annotations
@@ -46,10 +46,12 @@ from rotor_mbs.runs.hdf5 import Column, TableSpec, read_groups, reading
 from rotor_mbs.runs.rows import RowLocation, blank_rows
 from rotor_mbs.runs.trailer import RESULTS, SWEEP, Regions, Trailer
 
-# Attribute of a sweep's file: a hash of its whole design.
+# Name of the attribute of a sweep's file that has a hash of its whole design.
 IDENTITY = "sweep_identity"
-_READ_BYTES = 1 << 25  # read at once when checksums are verified
-_LONGEST_LABEL = 1000  # characters; names of files are shorter
+_READ_BYTES = 1 << 25  # bytes that are read at once when checksums are verified
+# Longest label of a run, in characters. A longer label is damaged: a scene has the name of a file,
+# which is shorter.
+_LONGEST_LABEL = 1000
 T = TypeVar("T")
 
 
@@ -59,8 +61,9 @@ class StoredTable(TableSpec):
 
     Attributes
     ----------
-    path, inode : the file.
-    offsets : where each computed column begins in it, in bytes.
+    path : the file.
+    inode : inode of the file.
+    offsets : position in the file at which each computed column begins, in bytes.
     """
 
     path: Path
@@ -69,13 +72,13 @@ class StoredTable(TableSpec):
 
     @classmethod
     def of(cls, table: TableSpec, path: Path, inode: int, regions: Regions) -> Self:
-        """Return a table in a file.
+        """Return a table with its location in a file.
 
         Parameters
         ----------
         table : the table.
-        path, inode : the file.
-        regions : offset and length of each computed column, by group.
+        path, inode : path and inode of the file.
+        regions : offset and length of each computed column in bytes, by group.
         """
         return cls(
             group=table.group,
@@ -91,17 +94,17 @@ class StoredTable(TableSpec):
 
     @property
     def columns(self) -> dict[str, Column]:
-        """Return the descriptions of its columns and scales, by name, without that of `run`."""
+        """Return the descriptions of all columns and scales but `run`, by name."""
         return {name: column for name, (column, _) in self.known.items()} | {**self.computed}
 
     def column(self, name: str) -> NDArray[Any]:
         """Return a column or a scale of the table, (rows, ...).
 
-        A computed column is a memory map of the file, read where it is indexed.
+        A computed column is a memory map of the file: its values are read when it is indexed.
 
         Parameters
         ----------
-        name : of the column; "run" for the labels or numbers of the rows.
+        name : name of the column; "run" for the labels or numbers of the rows.
 
         Raises
         ------
@@ -127,18 +130,18 @@ class StoredTable(TableSpec):
     def rows(
         self, name: str, rows: Sequence[int] | NDArray[np.intp], sample: int | None = None
     ) -> NDArray[Any]:
-        """Return some rows of a column, (rows, ...); a scale such as `time` as a whole.
+        """Return some rows of a column, (rows, ...), or a whole scale such as `time`.
 
         Parameters
         ----------
-        name : of the column.
-        rows : their numbers.
-        sample : number of the sample of an array over time; None for all.
+        name : name of the column or the scale.
+        rows : numbers of the rows.
+        sample : number of the sample that is returned of an array over time; None for all samples.
 
         Raises
         ------
         StoreError
-            If there is no such column.
+            If there is no such column, or the file has been replaced.
         """
         column = self.column(name)
         if name in self.known and self.known[name][0].dimensions[:1] != ("run",):
@@ -148,11 +151,11 @@ class StoredTable(TableSpec):
     def statuses(self) -> NDArray[np.int8]:
         """Return the verified status of each row, (rows,) int8.
 
-        It is MISSING for rows that are not stored, or whose checksum is wrong.
+        The status is MISSING for a row that is not stored, or whose checksum is wrong.
         """
         marked, place = np.array(self.column("status")), self.place()
         statuses = np.full_like(marked, MISSING)
-        # In blocks: the rows of a large file need not fit into memory.
+        # Rows are read in blocks, as all rows of a large file may not fit into memory.
         step = max(_READ_BYTES // place.row_type.itemsize, 1)
         for start in range(0, len(marked), step):
             part = marked[start : start + step]
@@ -161,7 +164,7 @@ class StoredTable(TableSpec):
         return statuses
 
     def clear(self) -> None:
-        """Write blank values into all rows of a new file; their statuses are not changed."""
+        """Write blank values into all rows of a new file, except the statuses."""
         with self.path.open("r+b") as file:
             for name, blank in blank_rows(1, self.row_type).items():
                 if name == "status":
@@ -172,10 +175,10 @@ class StoredTable(TableSpec):
                     file.write(blank.data)
 
     def place(self, row: int = 0) -> RowLocation:
-        """Return the location of the rows from number `row` on.
+        """Return the location of a row and of the rows after it.
 
-        The initial value of a checksum is the number of the run if runs are numbered, otherwise
-        that of the row.
+        The checksum of a row begins with the number of its run if runs are numbered, otherwise with
+        the number of the row.
 
         Parameters
         ----------
@@ -195,9 +198,9 @@ def parsed(text: object, kind: type[T], place: object) -> T:
 
     Parameters
     ----------
-    text : the text; a file may hold anything.
+    text : the text as it was read; in a damaged file it may be of any type.
     kind : the type that the value must have.
-    place : the file and the part of it, for the message.
+    place : the file and the part of the file, for the message.
 
     Raises
     ------
@@ -216,14 +219,14 @@ def parsed(text: object, kind: type[T], place: object) -> T:
 
 
 class TableFile:
-    """The tables of a file by their groups; rows are read and written by their location.
+    """The tables of a file, and the locations by which their rows are read and written.
 
     Attributes
     ----------
     path : the file.
-    attributes : of the file.
-    groups : names of all its tables.
-    tables : those that have been read, by group.
+    attributes : attributes of the file.
+    groups : groups of all tables of the file.
+    tables : the tables that have been read, by group.
     """
 
     def __init__(
@@ -239,8 +242,8 @@ class TableFile:
         ----------
         path : the file.
         only : groups of the tables that are read, by default all.
-        laid_out_as : attributes and all tables of a file that was just laid out, in place of
-            reading it.
+        laid_out_as : attributes and all tables of a file that was just laid out. If they are given,
+            the file is not read.
 
         Raises
         ------
@@ -260,7 +263,7 @@ class TableFile:
             self.groups = list(self.tables)
 
     def read(self, only: Collection[str] | None = None) -> None:
-        """Read further tables of the file, by default all that have not been read."""
+        """Read tables that have not been read yet: those in `only`, by default all."""
         if self.tables:
             missing = set(self.groups) - set(self.tables)
             only = missing if only is None else missing & set(only)
@@ -277,13 +280,13 @@ class TableFile:
             self._check_runs()
 
     def copy(self) -> TableFile:
-        """Return a copy with the same tables, in which tables can be added and removed."""
+        """Return a copy with the same tables, whose `tables` can be changed independently."""
         other = copy.copy(self)
         other.tables = dict(self.tables)
         return other
 
     def _check_runs(self) -> None:
-        """Raise StoreError if a run has no arrays."""
+        """Raise StoreError if a row of /runs has a wrong label, or its scene has no row for it."""
         rows = self.tables[RUNS].known_rows if RUNS in self.tables else {}
         for run, row in rows.items():
             scene, method = row["scene"], row["method_name"]
@@ -294,12 +297,12 @@ class TableFile:
                 raise StoreError(f"{self.path}: {run[:_LONGEST_LABEL]} has no arrays; damaged")
 
     def place(self, run: str, group: str = RUNS) -> RowLocation:
-        """Return the location of a row; that of a run includes its arrays.
+        """Return the location of a row. For a row of /runs, it includes the arrays of the run.
 
         Parameters
         ----------
         run : label of the row.
-        group : of its table.
+        group : group of the table.
         """
         stored = self.tables[group]
         row = stored.row_of[run]
@@ -309,7 +312,8 @@ class TableFile:
         scene = str(stored.column("scene")[row])
         arrays = self.tables[scene]
         label = run.removeprefix(f"{scene}/")
-        # Columns of /runs first, then those of the scene's table under names of their own.
+        # The columns of /runs come first. Those of the scene's table follow; columns that it
+        # repeats get other names.
         offsets = dict(place.offsets)
         kinds = [(name, place.row_type[name]) for name in place.row_type.names or ()]
         of_arrays = arrays.place(arrays.row_of[label])
@@ -317,7 +321,7 @@ class TableFile:
             joined_name = STATUS_COPIES.get(name, name)
             offsets[joined_name] = of_arrays.offsets[name]
             kinds.append((joined_name, of_arrays.row_type[name]))
-        # Arrays that a scene has once are part of the reference's row.
+        # An array that a scene has only once is part of the reference's row.
         for name, column in arrays.computed.items():
             if label == REFERENCE and "run" not in column.dimensions:
                 offsets[name] = arrays.offsets[name]
@@ -327,20 +331,21 @@ class TableFile:
 
 _opened: dict[tuple[Path, Path, tuple[int, ...]], TableFile] = {}
 _opened_lock = threading.Lock()  # held while `_opened` is used
-_MAX_OPENED = 4  # files whose tables are kept
-# ns. A write that is later than the last one by more than this has another time stamp.
+_MAX_OPENED = 4  # number of files whose tables are kept in memory
+# Time in ns: two writes to a file that are further apart have different time stamps.
 _SETTLED_NS = 100_000_000
 
 
 def opened_tables(path: Path, only: Collection[str] | None = None) -> TableFile:
-    """Return the tables of a file, kept in memory until the file changes.
+    """Return the tables of a file, from memory if it has not changed since they were read.
 
-    The layout is kept, that is descriptions and the design of the runs, but no rows.
+    The tables in memory have descriptions and known columns, but no rows of computed columns.
 
     Parameters
     ----------
-    path, only : see `TableFile`; the result may have further tables, which an earlier call asked
-        for.
+    path : the file.
+    only : groups of the tables that are needed, by default all. The result also has the tables that
+        earlier calls needed.
 
     Raises
     ------
@@ -350,8 +355,8 @@ def opened_tables(path: Path, only: Collection[str] | None = None) -> TableFile:
     try:
         state = path.stat()
     except OSError:
-        return TableFile(path, only)  # says what is wrong
-    # The path as it is given is a part of the key, too: the tables' messages have it.
+        return TableFile(path, only)  # raises a StoreError with the reason
+    # The key also has the path as it is given, because the messages of the tables show it.
     stamp = (path, path.absolute(), (state.st_dev, state.st_ino, state.st_size, state.st_mtime_ns))
     with _opened_lock:
         file = _opened.pop(stamp, None)
@@ -360,7 +365,7 @@ def opened_tables(path: Path, only: Collection[str] | None = None) -> TableFile:
     else:
         file.read(only)
     is_settled = time.time_ns() - state.st_mtime_ns > _SETTLED_NS
-    with suppress(OSError):  # removed meanwhile
+    with suppress(OSError):  # the file was removed meanwhile
         is_settled = is_settled and path.stat().st_mtime_ns == state.st_mtime_ns
         with _opened_lock:
             if is_settled:
@@ -371,17 +376,17 @@ def opened_tables(path: Path, only: Collection[str] | None = None) -> TableFile:
 
 
 def _table(path: Path, stored: TableSpec, trailer: Trailer) -> StoredTable:
-    """Return the table of a group.
+    """Return the table of a group, with its location in the file.
 
     Parameters
     ----------
-    path, trailer : the file.
-    stored : what was read of it.
+    path, trailer : path and trailer of the file.
+    stored : the group as it was read.
 
     Raises
     ------
     StoreError
-        If it is no table, or differs from what was laid out.
+        If the group is no table of this program, or a column has a wrong type or wrong dimensions.
     """
     table = StoredTable.of(stored, path, trailer.inode, trailer.groups)
     for name, column in table.computed.items():
@@ -399,7 +404,8 @@ def _table(path: Path, stored: TableSpec, trailer: Trailer) -> StoredTable:
     return table
 
 
-# What the table of each group must have: computed columns, known columns, attributes.
+# Names that a table must have, by group: of computed columns, of known columns, of attributes. All
+# other groups are tables of scenes.
 _REQUIRED: Mapping[str, tuple[Collection[str], Collection[str], Collection[str]]] = {
     "": (("status", "crc32"), (), ()),
     RUNS: (
@@ -413,9 +419,9 @@ _REQUIRED_OF_SCENE = (STATUS_COPIES, ("time",), ("title", "scene_toml", "scene_h
 
 
 def _check_table(table: StoredTable) -> None:
-    """Raise StoreError if a table lacks something that is required, or columns are inconsistent.
+    """Raise StoreError if a table lacks a required name, or its columns are inconsistent.
 
-    The digest does not replace this check: a file of another program can have a right digest.
+    This check is needed beside the digest: a file of another program can have a right digest.
 
     Parameters
     ----------
