@@ -18,25 +18,25 @@ from rotor_mbs.runs.table import IDENTITY, TableFile
 from rotor_mbs.runs.trailer import RESULTS, may_extend, read_trailer
 from rotor_mbs.runs.versions import machine, versions
 
-KnownRows = Mapping[str, Mapping[str, Any]]  # by label: known values by name of the column
+KnownRows = Mapping[str, Mapping[str, Any]]  # known values by label of the row, then by column
 
 
 def fit_file_to_request(
     path: Path, wanted: Sequence[TableSpec], replaced: Collection[tuple[str, str, str]] = ()
 ) -> TableFile:
-    """Add the rows of requested tables to a results file, which is created if there is none.
+    """Add the rows of requested tables to a results file; the file is created if there is none.
 
     If the file has all rows as they are requested, nothing is written. Otherwise a new file is laid
-    out beside it, the rows that stay are copied into it, and the new file replaces the old one. A
-    row is missing afterwards if anything in its design differs (settings, versions, the scene's
-    numbers).
+    out beside it, the rows that stay are copied into the new file, and the new file replaces the
+    old one. A requested row is missing afterwards if the stored row differs from it in the design
+    (settings, versions, the scene's numbers).
 
     Parameters
     ----------
-    path : the results file; a symbolic link is followed, and stays one.
+    path : the results file. If it is a symbolic link, the link stays, and its target is replaced.
     wanted : the tables that are requested.
-    replaced : (group, scene, curve or method) of stored rows that are dropped unless they
-        are in `wanted`.
+    replaced : curves as (group, scene, curve or method). Their stored rows are dropped, except
+        those that are in `wanted`.
 
     Returns
     -------
@@ -60,7 +60,7 @@ def fit_file_to_request(
     _refuse_loss(path, _known_rows(stored.get(RUNS)), _known_rows(requested.get(RUNS)))
     merged = _merged_tables(stored, requested, replaced)
     kept = _kept_rows(stored, requested, merged)
-    # The file is kept if it has these rows and columns, and none of its rows is dropped.
+    # The old file stays if it has the merged rows and columns, and all its rows are kept.
     count = sum(len(table.runs) for table in stored.values() if "crc32" in table.computed)
     if len(kept) == count and _layout(merged) == _layout(stored):
         return file
@@ -75,8 +75,8 @@ def fit_file_to_request(
 def _refuse_loss(path: Path, stored: KnownRows, requested: KnownRows) -> None:
     """Raise InputError if runs would be lost because the numbers of their scene have changed.
 
-    A file has only one scene of each name. If its numbers have changed, its stored runs cannot
-    stay.
+    A file has only one scene of each name. If the numbers of that scene change, its stored runs
+    cannot stay.
 
     Parameters
     ----------
@@ -102,15 +102,16 @@ def _merged_tables(
     requested: Mapping[str, TableSpec],
     replaced: Collection[tuple[str, str, str]],
 ) -> dict[str, TableSpec]:
-    """Return the tables of the new file by group: with stored rows that stay, and requested ones.
+    """Return the tables of the new file by group, with the stored rows that stay and new rows.
 
     Parameters
     ----------
-    stored, requested : tables by group.
+    stored, requested : tables of the file and requested tables, by group.
     replaced : stored rows that are dropped, see `fit_file_to_request`.
     """
     merged: dict[str, TableSpec] = {}
-    # Tables with a row per run or point; those of the scenes' arrays have no checksums.
+    # First the tables with a row per run or point. Tables of scenes are skipped: they are those
+    # without checksums.
     for group in dict.fromkeys((*stored, *requested)):
         before, wanted = stored.get(group), requested.get(group)
         base = wanted or stored[group]
@@ -129,14 +130,14 @@ def _merged_tables(
             for name, (column, _) in base.known.items():
                 known[name] = column, [rows[run][name] for run in runs]
             merged[group] = _with_columns_of(before, base, runs, known)
-    # Tables of the scenes' arrays: a row for each run that /runs has now.
+    # Then the tables of scenes, with a row for each run that the new /runs has.
     methods: dict[str, list[str]] = {}  # by scene
     for row in _known_rows(merged.get(RUNS)).values():
         methods.setdefault(row["scene"], []).append(row["method_name"])
     for scene, names in methods.items():
         before, wanted = stored.get(scene), requested.get(scene)
         base = wanted or stored[scene]
-        # Arrays of a scene with other numbers are not taken over.
+        # If the numbers of the scene have changed, the stored table's columns are not taken over.
         if before is not None and before.attributes["scene_hash"] != base.attributes["scene_hash"]:
             before = None
         merged[scene] = _with_columns_of(before, base, names, base.known)
@@ -149,15 +150,16 @@ def _with_columns_of(
     runs: Sequence[str],
     known: Mapping[str, tuple[Column, Any]],
 ) -> TableSpec:
-    """Return a table like `base`, with other rows, that also has the computed columns of `before`.
+    """Return a table like `base` with other rows, and with the computed columns of `before`, too.
 
     Parameters
     ----------
-    before, base : the stored table if there is one, and the requested one, or else the stored one.
-    runs, known : of the new table.
+    before : the stored table; None if there is none.
+    base : the requested table; the stored table if none is requested.
+    runs, known : labels of the rows and known columns of the new table.
     """
     columns = {**(before.computed if before else {}), **base.computed}
-    checksum = columns.pop("crc32", None)  # the last of the columns
+    checksum = columns.pop("crc32", None)  # it must be the last column
     if checksum is not None:
         columns["crc32"] = checksum
     return TableSpec(base.group, runs, known, columns, base.attributes, base.characters)
@@ -168,13 +170,15 @@ def _kept_rows(
     requested: Mapping[str, TableSpec],
     merged: Mapping[str, TableSpec],
 ) -> list[tuple[str, str]]:
-    """Return group and label of the stored rows that are copied into the new file.
+    """Return (group, label) of the stored rows that are copied into the new file.
 
-    A row of a run or a point stays if it is not requested, or is as it is requested.
+    A row of a run or a point is copied if the new file has its label, and the row either is not
+    requested or is as it is requested.
 
     Parameters
     ----------
-    stored, requested, merged : tables by group.
+    stored, requested, merged : tables of the old file, requested tables and tables of the new file,
+        by group.
     """
     kept = []
     for group, table in stored.items():
@@ -188,20 +192,21 @@ def _kept_rows(
 
 
 def copy_file(source: Path, target: Path) -> None:
-    """Copy a file with tables. A file at the target is replaced only if none of its rows is lost.
+    """Copy a file with tables to a path; a file at that path is replaced only if no row is lost.
 
     Parameters
     ----------
     source : the file.
-    target : the copy. A file there is replaced if it is of the same kind and `source` has all its
-        stored rows. Different sweeps have no rows in common.
+    target : path of the copy. A file at `target` is replaced if it is of the same kind, and
+        `source` has rows with the labels of all its stored rows. Different sweeps have no rows in
+        common.
 
     Raises
     ------
     InputError
-        If rows would be lost, or `target` is of another kind.
+        If rows would be lost, or the file at `target` is of another kind.
     StoreError
-        If `target` is damaged, not of this program, or cannot be written.
+        If the file at `target` is damaged or not of this program, or `target` cannot be written.
     """
     with locked(target):
         if may_extend(target, read_trailer(source).kind):
@@ -222,17 +227,17 @@ def copy_file(source: Path, target: Path) -> None:
 
 
 def _known_rows(table: TableSpec | None) -> KnownRows:
-    """Return the known values of each row of a table, by label; none without a table."""
+    """Return the known values of each row of a table, by label; no rows if there is no table."""
     return {} if table is None else table.known_rows
 
 
 def _is_same_row(stored: Mapping[str, Any], requested: Mapping[str, Any]) -> bool:
-    """Return whether the known values of a row are those that are requested."""
+    """Return whether a stored row and a requested row have the same known values."""
     if stored.keys() != requested.keys():
         return False
     for name, value in stored.items():
         other = requested[name]
-        # A number that is missing is NaN, which differs from itself.
+        # A missing number is NaN, which differs from itself.
         are_both_missing = value != value and other != other
         if value != other and not are_both_missing:
             return False
@@ -240,20 +245,20 @@ def _is_same_row(stored: Mapping[str, Any], requested: Mapping[str, Any]) -> boo
 
 
 def _layout(tables: Mapping[str, TableSpec]) -> dict[str, object]:
-    """Return the rows and the computed columns of tables, by group."""
+    """Return the labels of the rows and the names of the computed columns of tables, by group."""
     return {group: (list(table.runs), {*table.computed}) for group, table in tables.items()}
 
 
 def _write_tables(
     path: Path, tables: Sequence[TableSpec], rows: Sequence[tuple[str, str, Rows]]
 ) -> TableFile:
-    """Write a new file with tables, in which the given rows are filled and the others blank.
+    """Write a new file with tables; the given rows are filled, all other rows are blank.
 
     Parameters
     ----------
-    path : of the file.
-    tables : all that it has.
-    rows : group and label of each row that is filled, and its columns.
+    path : path of the file.
+    tables : all tables of the file.
+    rows : group, label and columns of each row that is filled.
 
     Returns
     -------
@@ -285,11 +290,11 @@ def _write_tables(
             stored.clear()
         for group, run, values in rows:
             place = file.place(run, group)
-            # A column that the earlier row did not have stays blank.
+            # A column that the copied row did not have in the old file stays blank.
             columns = blank_rows(1, place.row_type)
             for name in columns:
                 columns[name] = values.get(name, columns[name])
             place.write(columns)
-    # The file that was laid out has its final name now.
+    # The tables still have the temporary name under which the file was laid out.
     laid_tables = [replace(stored, path=path) for stored in file.tables.values()]
     return TableFile(path, laid_out_as=(attributes, laid_tables))

@@ -1,16 +1,17 @@
 """Read scenes, runs and records from results files; write records.
 
-A row is read when something of it is used. A run can be returned as the Solution that was stored,
+The row of a run is read when one of its values is used. A stored run can be returned as a Solution,
 so that it can be judged again. No engine is needed.
 
-What studies store beside runs are records: tables of points, and groups of arrays with dimensions
-of their own.
+Studies also store records. A record is the points of a curve or ladder in a table, or a group of
+arrays with its own dimensions.
 
 /bench                          a row per point of a curve: a method at one setting on a scene
 /stability                      a row per step of a ladder: a fixed-step method on a scene
-/modes/<scene>/<model>/<kind>   modes over speed, in a file of modes
-/comparison/<scene>/data/trajectory   data of another program and the reference at their times
-/comparison/<scene>/data/modes        the same of modes, over speed
+/modes/<scene>/<model>/<kind>   modes over rotor speed, in a file of modes
+/comparison/<scene>/data/trajectory   data of another program over time, with reference values
+/comparison/<scene>/data/modes        modes of another program over rotor speed, with reference
+                                      values
 """
 
 from __future__ import annotations
@@ -69,15 +70,15 @@ _TEXTS = ("message", "engine_message")
 
 @dataclass(frozen=True, eq=False)
 class StoredRun:
-    """A run in a file: that of a method on a scene, the reference of a scene, or one of a sweep.
+    """A run in a results file or in the file of a sweep; the reference of a scene is a run, too.
 
-    Its row is read, and verified, when something of it is used.
+    The row of the run is read and verified when one of its values is used.
 
     Attributes
     ----------
-    scene_name, method : names.
-    known : columns of the design by name: settings, versions, ...
-    scales : time, coordinate, blade, axis, as far as they exist.
+    scene_name, method : name of the scene and name of the method.
+    known : known values of the row by column: settings, versions, ...
+    scales : the scales time, coordinate, blade and axis, as far as the table has them.
     """
 
     scene_name: str
@@ -92,19 +93,22 @@ class StoredRun:
 
     @functools.cached_property
     def _stored(self) -> Rows:
-        """Return the columns of its row as they are in the file."""
+        """Return the columns of the run's row as they are in the file, without verifying them."""
         with reading(self._name):
             return self._place.read(file=self._file)
 
     @functools.cached_property
     def is_damaged(self) -> bool:
-        """Return whether the checksum of its row is wrong."""
+        """Return whether the checksum of the run's row is wrong."""
         row = self._stored
         return bool((checksums(self._place.first, row, self._place.row_type) != row["crc32"]).any())
 
     @functools.cached_property
     def _row(self) -> Rows:
-        """Return the columns of its row. Raises StoreError if their checksum is wrong."""
+        """Return the values of the run's row, by column.
+
+        Raises StoreError if their checksum is wrong, unless runs are opened without verifying.
+        """
         if self._verify and self.is_damaged:
             raise StoreError(f"{self._name} changed after it was written")
         return {name: values[0] for name, values in self._stored.items()}
@@ -115,14 +119,14 @@ class StoredRun:
 
     @functools.cached_property
     def scene(self) -> Scene:
-        """Return its scene. Raises InputError if what is stored is no scene."""
+        """Return the scene of the run. Raises InputError if the stored text is no scene."""
         return self._read_scene()
 
     @property
     def reference(self) -> Trajectory | None:
         """Return the samples of the reference in the file.
 
-        None is returned if the file has none, and if this run is the reference.
+        None is returned if the file has no reference, and if this run is the reference itself.
         """
         return None if self.method == REFERENCE else self._read_reference()
 
@@ -130,7 +134,7 @@ class StoredRun:
     def attributes(self) -> dict[str, Any]:
         """Return status, message, metrics, times ... of the run as plain values, by name.
 
-        Those that the run does not have are left out.
+        Values that the run does not have are left out.
         """
         facts: dict[str, Any] = {"status": self.status, "settings": self.known["settings"]}
         facts |= {name: text_of(self._row[name]) for name in _TEXTS if name in self._row}
@@ -138,7 +142,7 @@ class StoredRun:
             if name in ("status", "crc32", *STATUS_COPIES.values(), *_TEXTS) or np.ndim(value):
                 continue
             number = value.item()
-            # A number that the run does not have is -1 or NaN.
+            # -1 and NaN stand for a number that the run does not have.
             is_whole = isinstance(number, int) and number >= 0
             is_real = isinstance(number, float) and not math.isnan(number)
             if is_whole or is_real:
@@ -151,18 +155,18 @@ class StoredRun:
 
     @property
     def is_frozen(self) -> bool:
-        """Return whether it is a reference that was read from a shipped file."""
+        """Return whether the run is a reference that was shipped, or copied from a shipped file."""
         return "frozen_with" in parsed(self.known.get("versions", "{}"), dict, self._name)
 
     @property
     def status(self) -> str:
-        """Return the name of its status."""
+        """Return the status of the run; "" for an unknown code."""
         code = int(self._row["status"])
         return STATUSES[code] if 0 <= code < len(STATUSES) else ""
 
     @property
     def settings(self) -> dict[str, Any]:
-        """Return the settings of its method. Raises StoreError if they are damaged."""
+        """Return the settings of the method. Raises StoreError if they are damaged."""
         return parsed(self.known["settings"], dict, self._name)
 
     @property
@@ -179,7 +183,7 @@ class StoredRun:
         """Return the number of samples that the run computed."""
         if not self._is_of_sweep:
             return int(self._row["samples"])
-        # Samples are counted in the arrays, which are NaN from where the run broke off.
+        # The samples of a run of a sweep are counted in its arrays, which are NaN after its end.
         is_finite = []
         for values in self._own_arrays.values():
             if len(values) == len(self.scales["time"]):
@@ -188,12 +192,12 @@ class StoredRun:
 
     @property
     def _is_of_sweep(self) -> bool:
-        """Return whether it is a run of a sweep, in which samples are not counted."""
+        """Return whether the run is one of a sweep, whose file has no numbers of samples."""
         return "samples" not in self._row
 
     @property
     def _own_arrays(self) -> dict[str, NDArray[Any]]:
-        """Return its arrays by name, including the rows after its last sample."""
+        """Return the arrays of the run by name, including the NaN after its last sample."""
         return {
             name: values
             for name, values in self._row.items()
@@ -202,10 +206,9 @@ class StoredRun:
 
     @functools.cached_property
     def _arrays(self) -> dict[str, NDArray[Any]]:
-        """Return its arrays by name, scales included, up to its last sample.
+        """Return the arrays of the run up to its last sample, and the scales, by name.
 
-        An array that its method or its scene's outputs do not have is NaN in all samples, and left
-        out.
+        An array that is NaN in all samples is left out: the run does not have it.
         """
         count = self.samples
         scales = {
@@ -219,32 +222,32 @@ class StoredRun:
 
     @property
     def names(self) -> list[str]:
-        """Return the names of its arrays, scales included."""
+        """Return the names of the arrays of the run, and of the scales."""
         return list(self._arrays)
 
     def __contains__(self, name: str) -> bool:
         return name in self._arrays
 
     def array(self, name: str) -> NDArray[Any]:
-        """Return an array or a scale, (samples, ...). Raises StoreError if the run has none."""
+        """Return an array or a scale by name. Raises StoreError if the run does not have it."""
         if name not in self:
             raise StoreError(f"{self._name} has no {name}")
         return self._arrays[name]
 
     def get(self, name: str) -> NDArray[Any] | None:
-        """Return an array or a scale, or None if the run has none of that name."""
+        """Return an array or a scale by name, or None if the run does not have it."""
         return self._arrays.get(name)
 
     def faults(self, *, complete: bool = True) -> list[str]:
         """Return a line for every array that is missing or wrong.
 
-        A frozen reference needs only its angles, rates and what cannot be derived from them; a
-        method that is not built in needs only angles and rates.
+        A frozen reference needs only angles, rates and the arrays that cannot be derived from them.
+        A run of a method that is not built in needs only angles and rates.
 
         Parameters
         ----------
-        complete : whether the run must have all samples of the scene. If not, it may end early, but
-            each array must have a sample for each of the stored times.
+        complete : whether the run must have all samples of the scene. Otherwise it may end early,
+            but each array must have a row for each stored time.
         """
         scene, faults = self.scene, []
         rows = len(self.array("time")) if "time" in self else scene.samples
@@ -254,7 +257,8 @@ class StoredRun:
         may_omit_others = self.is_frozen or not is_built_in(self.method)
         expected: dict[str, tuple[int, ...]] = {"time": (rows,)}
         for quantity in quantities(scene.outputs):
-            if self._is_of_sweep and quantity.name not in self._row:  # a sweep has its own outputs
+            # The outputs of a sweep may differ from those of its scene.
+            if self._is_of_sweep and quantity.name not in self._row:
                 continue
             if may_omit_others and quantity.name not in (*always_there, *self.names):
                 continue
@@ -296,8 +300,8 @@ class StoredRun:
         trajectory, facts = self.trajectory(), self.attributes
         if trajectory is None:
             return None
-        # The engine's report, as far as it is stored. In a shipped file a reference has none, and
-        # is a success. A sweep stores none, and the status takes its place.
+        # A results file stores the engine's report. A shipped reference has no report, and counts
+        # as a success. The file of a sweep has no reports, so that the status takes their place.
         is_reported = "engine_success" in self._row
         success = self.is_frozen if is_reported else self.status == "ok"
         success = bool(facts.get("engine_success", success))
@@ -330,9 +334,10 @@ class StoredScene:
 
     Attributes
     ----------
-    name : of the scene.
-    attributes : title, figures, blades, scene_toml, scene_hash.
-    runs : by name of the method; the reference first, then methods in the order of the catalogue.
+    name : name of the scene.
+    attributes : attributes of its table: title, figures, blades, scene_toml, scene_hash.
+    runs : stored runs by name of the method. The reference comes first, and the methods follow in
+        the order of the catalogue.
     """
 
     name: str
@@ -348,27 +353,27 @@ class StoredScene:
     def reference_trajectory(self) -> Trajectory | None:
         """Return the samples of the reference.
 
-        It is None if there is none, or its arrays cannot be used.
+        None is returned if the file has no reference, or its arrays cannot be used.
         """
         return None if self.reference is None else self.reference.trajectory()
 
     @functools.cached_property
     def changes(self) -> list[SceneChange] | None:
-        """Return the changes to this package's scene of the same name.
+        """Return how the scene differs from the shipped scene of the same name.
 
-        None is returned if this package has no scene of the name.
+        None is returned if no scene of that name is shipped.
         """
         shipped = shipped_scene(self.name)
         return None if shipped is None else scene_changes(shipped, self.scene)
 
     @property
     def label(self) -> str:
-        """Return its name, with the changes to a scene of this package."""
+        """Return the name of the scene, with its changes to the shipped scene of that name."""
         return label_with_changes(self.name, self.changes or ())
 
     @property
     def is_shipped(self) -> bool:
-        """Return whether its motion is that of this package's scene of the same name.
+        """Return whether the scene moves like the shipped scene of the same name.
 
         Samples and outputs may differ.
         """
@@ -376,7 +381,7 @@ class StoredScene:
 
     @property
     def figures(self) -> str:
-        """Return the paper's figures that show its motion, as "11, 13a"; "" if none does."""
+        """Return the paper's figures that show the scene, such as "11, 13a"; "" if none does."""
         return str(self.attributes.get("figures", "")) if self.is_shipped else ""
 
     @property
@@ -386,7 +391,7 @@ class StoredScene:
 
     @property
     def reference(self) -> StoredRun | None:
-        """Return the run of the reference, or None."""
+        """Return the run of the reference, or None if the file has none."""
         return self.runs.get(REFERENCE)
 
     @property
@@ -396,13 +401,16 @@ class StoredScene:
 
     @property
     def printed(self) -> StoredRun | None:
-        """Return the run of the printed equations with all errata, or None without samples."""
+        """Return the run of the equations as printed, or None if there is none with samples."""
         run = self.runs.get(PRINTED)
         return run if run is not None and run.samples else None
 
     @property
     def corrected_runs(self) -> dict[str, StoredRun]:
-        """Return the runs of the corrected models except the reference, also without samples."""
+        """Return the runs of corrected models by method, except the reference.
+
+        Runs without samples are included.
+        """
         return {name: run for name, run in self.methods.items() if is_corrected(name)}
 
     @property
@@ -416,7 +424,7 @@ class StoredScene:
 
     @property
     def sides(self) -> dict[str, StoredRun]:
-        """Return the runs "printed" and "corrected", as far as they exist."""
+        """Return the runs `printed` and `corrected` by these names, as far as they exist."""
         sides = {"printed": self.printed, "corrected": self.corrected}
         return {side: run for side, run in sides.items() if run is not None}
 
@@ -427,10 +435,10 @@ class OpenResults:
 
     Attributes
     ----------
-    path : of the file.
-    attributes : versions, platform, created.
-    scenes : by name, in natural order.
-    rows : labels of all rows of `/runs`, in the order of the file, computed or not.
+    path : path of the file.
+    attributes : attributes of the file: versions, platform, created, ...
+    scenes : scenes with stored runs by name, in natural order.
+    rows : labels of all rows of `/runs`, in the order of the file, including rows that are missing.
     """
 
     path: Path
@@ -443,13 +451,15 @@ class OpenResults:
 def open_results(
     path: Path, *, verify: bool = True, only: Collection[str] | None = None
 ) -> Iterator[OpenResults]:
-    """Open a results file for the block; a file that replaces it meanwhile is not seen.
+    """Open a results file for the block.
+
+    If another file replaces it during the block, the block still reads the old file.
 
     Parameters
     ----------
     path : the file.
     verify : whether a run is compared with its checksum when it is read.
-    only : names of the scenes, by default all.
+    only : names of the scenes that are opened, by default all.
 
     Yields
     ------
@@ -458,7 +468,7 @@ def open_results(
     Raises
     ------
     StoreError
-        If the file cannot be read, or what it holds causes an error in the block.
+        If the file cannot be read, or its content causes an error in the block.
     """
     for _ in range(ATTEMPTS):
         stored = opened_tables(path, None if only is None else {RUNS, *only})
@@ -466,7 +476,7 @@ def open_results(
             inode = os.fstat(file.fileno()).st_ino
             if any(table.inode != inode for table in stored.tables.values()):
                 continue
-            with reading(path):  # around the caller's block, too, in which rows are read
+            with reading(path):  # the caller's block is included, as it reads rows
                 scenes = {scene.name: scene for scene in _scenes(stored, file, verify, only)}
                 yield OpenResults(
                     path,
@@ -479,18 +489,19 @@ def open_results(
 
 
 class StoredRuns:
-    """The runs of a results file, or of one of its scenes; it is open only while it is read.
+    """The runs of a results file, or of one scene in it.
 
-    `StoredSweep` has the same members for the runs of a sweep.
+    The file is open only while values are read. `StoredSweep` has the same members for the runs of
+    a sweep.
 
     Attributes
     ----------
-    labels : of the stored runs, in the order of `open_results`: method names for one scene,
-        otherwise "scene/method".
+    labels : labels of the stored runs, in the order of `open_results`. For one scene they are the
+        names of the methods, otherwise "scene/method".
     scenes : names of the scenes.
     subsets : names of the scenes whose runs can be selected.
-    group : of the arrays over time; None for several scenes.
-    keys : of varied parameters, which a results file does not have.
+    group : group of the arrays over time; None for several scenes.
+    keys : keys of varied parameters; always empty, as only a sweep varies parameters.
     """
 
     keys: Sequence[str] = ()
@@ -501,7 +512,7 @@ class StoredRuns:
         Parameters
         ----------
         path : a results file.
-        scene : name of a scene; "" for all.
+        scene : name of a scene; "" for all scenes.
 
         Raises
         ------
@@ -536,7 +547,7 @@ class StoredRuns:
 
     @functools.cached_property
     def title(self) -> str:
-        """Return the scene's name with the changes to a shipped one; "" for several scenes."""
+        """Return `StoredScene.label` of the scene; "" for several scenes."""
         if self.group is None:
             return ""
         with open_results(self._path, only=[self.group]) as results:
@@ -544,7 +555,7 @@ class StoredRuns:
 
     @contextmanager
     def opened_run(self, label: str) -> Iterator[StoredRun]:
-        """Open the file and yield a run. Raises StoreError if it is not there any more."""
+        """Open the file and yield a run. Raises StoreError if the run is not in it any more."""
         scene, method = self._names[label]
         with open_results(self._path, only=[scene]) as results:
             if scene not in results.scenes or method not in results.scenes[scene].runs:
@@ -563,19 +574,19 @@ class StoredRuns:
 
     @property
     def columns(self) -> dict[str, Column]:
-        """Return the columns of the runs by name; for one scene also those of its arrays."""
+        """Return the columns of /runs by name; for one scene also the columns of its arrays."""
         columns: dict[str, Column] = {}
         for table in reversed(self._tables()):
             columns = {**table.columns, **columns}
         return columns
 
     def values(self, name: str, sample: int | None = None) -> NDArray[Any]:
-        """Return a column of all runs, (runs, ...), in the order of the labels; or a scale.
+        """Return a column of all runs in the order of the labels, (runs, ...), or a scale.
 
         Parameters
         ----------
-        name : of the column.
-        sample : number of the sample of an array over time; None for the whole column.
+        name : name of the column or the scale.
+        sample : number of the sample that is returned of an array over time; None for all samples.
 
         Raises
         ------
@@ -592,16 +603,17 @@ class StoredRuns:
         raise StoreError(f"{self._path}: has no {shown_value(name)}")
 
     def _tables(self) -> list[StoredTable]:
-        """Return the table of the runs' numbers, then that of the scene's arrays."""
+        """Return the table /runs and, for one scene, the table of its arrays."""
         groups = [RUNS] if self.group is None else [self.group, RUNS]
         tables = opened_tables(self._path, groups).tables
         return [tables[group] for group in reversed(groups) if group in tables]
 
 
 def run_arrays(path: Path, group: str = "", scene: str = "") -> dict[str, NDArray[Any]]:
-    """Return the arrays of one run of a results file, of up to three dimensions.
+    """Return the arrays of up to three dimensions of one run of a results file, by name.
 
-    `group` and `scene` select the run "scene/method" as in `read_arrays`.
+    `group` and `scene` select the run by its name "scene/method", as `runs.arrays.read_arrays`
+    selects a group.
     """
     with open_results(path) as results:
         runs = {}
@@ -615,7 +627,7 @@ def run_arrays(path: Path, group: str = "", scene: str = "") -> dict[str, NDArra
 def is_sweep(path: Path) -> bool:
     """Return whether a file of this program is the dataset of a sweep.
 
-    Raises StoreError if it cannot be read.
+    Raises StoreError if the file cannot be read.
     """
     return read_trailer(path).kind == SWEEP
 
@@ -667,13 +679,14 @@ class Record:
 
     Attributes
     ----------
-    kind : a key of `POINT_COLUMNS`, "modes" or "comparison".
-    scene : its name.
-    name : the method, "lagrange/taylor". For a curve of a bench, settings that are constant along
-        it follow, if they are not the default ones.
+    kind : "bench" or "stability" (the keys of `POINT_COLUMNS`), "modes" or "comparison".
+    scene : name of the scene.
+    name : for a curve or a ladder, the name of the method, and settings that are constant along the
+        curve if they are not the default ones; otherwise the end of the group, as "data/modes".
     attributes : further values by name.
-    arrays : (rows,) by name; `status` as codes of `solution.status.STATUSES`.
-    columns : descriptions of the arrays, scales first; empty for points of curves and ladders.
+    arrays : arrays by name. Those of a curve or a ladder have the shape (points,); `status` has
+        codes of `solution.status.STATUSES`.
+    columns : descriptions of the arrays by name, scales first; empty for a curve or a ladder.
     """
 
     kind: str
@@ -690,12 +703,12 @@ class Record:
 
     @property
     def statuses(self) -> list[str]:
-        """Return the name of the status of each row."""
+        """Return the status of each point."""
         return [STATUSES[int(code)] for code in self.arrays["status"]]
 
     @property
     def messages(self) -> list[str]:
-        """Return a message for each row."""
+        """Return the message of each point."""
         return [
             str(text) for text in self.attributes.get("messages", [""] * len(self.arrays["status"]))
         ]
@@ -705,9 +718,9 @@ class Record:
 
 
 def points_table(group: str, points: Sequence[Mapping[str, object]]) -> TableSpec:
-    """Return the table of points of a group, "bench" or "stability".
+    """Return the table /bench or /stability with a row for each point.
 
-    Each point has its known columns by name, and `run`, its label.
+    A point has the values of its known columns by name, and its label as `run`.
     """
     runs = [str(point["run"]) for point in points]
     return TableSpec(
@@ -716,9 +729,10 @@ def points_table(group: str, points: Sequence[Mapping[str, object]]) -> TableSpe
 
 
 def read_records(path: Path, kind: str) -> list[Record]:
-    """Read the records of a kind, in the order of the file.
+    """Read all records of one kind, in the order of the file.
 
-    A curve of which a point is missing is left out. Raises StoreError if the file cannot be read.
+    A curve or ladder with a missing point is left out. Raises StoreError if the file cannot be
+    read.
     """
     if kind in POINT_COLUMNS:
         tables = TableFile(path, [kind]).tables.values()
@@ -749,7 +763,7 @@ def _point_records(stored: StoredTable) -> Iterator[Record]:
         arrays = {column: values[row_numbers] for column, values in columns.items()}
         setting_kind = str(known.get("setting_kind", "step"))
         arrays["setting"] = arrays[setting_kind]
-        # What the curve has as a whole stands in its first row; a number that is missing is NaN.
+        # The first row has the values of the curve as a whole. A missing number is NaN.
         facts: dict[str, Any] = {}
         for column, values in arrays.items():
             if column not in ("status", "message", "setting"):
@@ -757,7 +771,7 @@ def _point_records(stored: StoredTable) -> Iterator[Record]:
                 if value == value:
                     facts[column] = value
         messages = [text_of(text) for text in arrays.pop("message")]
-        if kind == "stability":  # without steps that were not needed
+        if kind == "stability":  # steps that were not needed are left out
             is_used = arrays["status"] != code_of("left_out")
             arrays = {column: array[is_used] for column, array in arrays.items()}
             messages = [messages[step] for step in np.flatnonzero(is_used)]
@@ -776,10 +790,10 @@ def _point_records(stored: StoredTable) -> Iterator[Record]:
 
 
 def write_records(path: Path, records: Sequence[Record]) -> None:
-    """Write records of one kind into a file, which keeps those of other scenes.
+    """Write records of one kind into a file, which keeps its records of other scenes.
 
-    New modes of a scene replace all earlier ones of the scene. A new comparison replaces one of the
-    same scene and name.
+    New modes of a scene replace all stored modes of the scene. A new comparison replaces a stored
+    comparison of the same scene and name.
 
     Parameters
     ----------
@@ -791,7 +805,7 @@ def write_records(path: Path, records: Sequence[Record]) -> None:
     InputError
         If `path` is a file of another kind.
     StoreError
-        If it cannot be read or written.
+        If the file cannot be read or written.
     """
     kind = records[0].kind
     scenes = {record.scene for record in records}
@@ -816,7 +830,7 @@ def write_records(path: Path, records: Sequence[Record]) -> None:
 
 
 def _record(group: TableSpec) -> Record:
-    """Return the record of a group of arrays."""
+    """Return the record that a group of a file of modes or comparisons holds."""
     kind, *scene, owner, name = group.group.split("/")
     scales_first = sorted(
         group.known.items(), key=lambda known: known[1][0].dimensions != (known[0],)
