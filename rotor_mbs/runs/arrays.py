@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from rotor_mbs.errors import StoreError
 from rotor_mbs.runs.hdf5 import attribute, is_dimension_only, reason_of
 
-# What says how an array of another program is to be read.
+# Attributes that tell how the values of an array of another program are to be read.
 ARRAY_ATTRIBUTES = (
     "units",
     "unit",
@@ -25,7 +25,7 @@ ARRAY_ATTRIBUTES = (
     "missing_value",
     "_Unsigned",
 )
-_MAX_MEMBERS = 1000  # of a group, that are listed with what they are
+_MAX_MEMBERS = 1000  # largest number of members, and of other groups, that are described
 
 
 class StoredArrays(NamedTuple):
@@ -33,10 +33,10 @@ class StoredArrays(NamedTuple):
 
     Attributes
     ----------
-    arrays : by name, of up to three dimensions, as they are stored.
-    attributes : for each array those of `ARRAY_ATTRIBUTES` that it has, numbers and texts.
-    others : for each other member of the group, by name: what it is, and whether it is a column of
-        something else than numbers.
+    arrays : arrays of numbers with up to three dimensions by name, as they are stored.
+    attributes : for each array its attributes in `ARRAY_ATTRIBUTES`, by name.
+    others : all else by name: the other members of the group, and other groups with arrays. Each
+        has a description, and whether it is an array of something else than numbers.
     """
 
     arrays: dict[str, NDArray[Any]]
@@ -49,21 +49,22 @@ def read_arrays(
 ) -> StoredArrays:
     """Read the arrays of numbers of one group of any HDF5 file, with their attributes.
 
-    Arrays have up to three dimensions.
+    Arrays of more than three dimensions are not read.
 
     Parameters
     ----------
-    path : the file; of another program, or of this one.
-    group : path of the group, or the end of it, "/" for the root. It may be left out if only one
-        group has arrays, or only one below `scene` except the reference.
-    scene : name of a scene, whose groups are preferred.
-    max_bytes : largest size of all arrays as float64, by what the file claims, before any is read.
+    path : a file of another program or of this one.
+    group : path of the group or the end of the path; "/" for the root. It may be "" if only one
+        group has arrays, apart from groups named "reference".
+    scene : name of a scene. If groups with arrays are below it, only these are considered.
+    max_bytes : largest total size of the arrays, counted as float64. The size that the file claims
+        is compared with it before any array is read.
 
     Raises
     ------
     StoreError
-        If the file cannot be read or claims more, or `group` is not found or ambiguous; the message
-        then has the groups that there are.
+        If the file cannot be read or claims too much, or `group` is not found or ambiguous. In the
+        last two cases the message lists the groups.
     """
     try:
         with h5py.File(path, "r") as file:
@@ -87,17 +88,17 @@ def read_arrays(
 
 
 def refuse_claims(path: Path, max_bytes: float) -> None:
-    """Raise StoreError if an HDF5 file is too large, or has arrays stored in other files.
+    """Raise StoreError if the arrays of an HDF5 file are too large, or are stored in other files.
 
     Parameters
     ----------
     path : the file.
-    max_bytes : largest size of all arrays as float64, by what the file claims.
+    max_bytes : largest total size of the arrays, as the file claims it, counted as float64.
 
     Raises
     ------
     StoreError
-        Also if the file cannot be read.
+        In these cases, and if the file cannot be read.
     """
     datasets: list[Any] = []
 
@@ -114,13 +115,13 @@ def refuse_claims(path: Path, max_bytes: float) -> None:
 
 
 def _refuse_claims(path: Path, datasets: Iterable[Any], max_bytes: float) -> None:
-    """Raise StoreError if datasets exceed `max_bytes` in all, or are stored in other files.
+    """Raise StoreError if datasets together exceed `max_bytes`, or one is stored in another file.
 
     Parameters
     ----------
-    path : of the file, for the message.
+    path : path of the file, for the message.
     datasets : the HDF5 datasets.
-    max_bytes : as float64.
+    max_bytes : largest total size of the datasets, counted as float64.
     """
     size = 0.0
     for dataset in datasets:
@@ -135,17 +136,17 @@ def _refuse_claims(path: Path, datasets: Iterable[Any], max_bytes: float) -> Non
 
 
 def _what_it_is(group: Any, name: str) -> tuple[str, bool]:
-    """Describe a member of a group that is no array of numbers.
+    """Describe a member of a group that `read_arrays` does not read.
 
     Parameters
     ----------
     group : the HDF5 group.
-    name : of the member.
+    name : name of the member.
 
     Returns
     -------
     str, bool
-        What it is, and whether it is a column of something else than numbers.
+        The description, and whether the member is an array of something else than numbers.
     """
     if group.get(name, getlink=True).__class__ is not h5py.HardLink:
         return "a link to another file or place", False
@@ -162,10 +163,9 @@ def _what_it_is(group: Any, name: str) -> tuple[str, bool]:
 
 
 def _attributes_of_array(dataset: Any) -> dict[str, Any]:
-    """Return those of `ARRAY_ATTRIBUTES` that an array has.
+    """Return the attributes of an array that are in `ARRAY_ATTRIBUTES`, by name.
 
-    Left out are lists of texts, which may take long to read, and values that are neither a number
-    nor a text.
+    Attributes with several values are left out: a list of texts may take long to read.
 
     Parameters
     ----------
@@ -178,7 +178,7 @@ def _attributes_of_array(dataset: Any) -> dict[str, Any]:
             and dataset.attrs.get_id(name).get_space().get_simple_extent_npoints() == 1
         ):
             value = attribute(dataset, name)
-            # A number keeps the type with which it was written.
+            # A number is returned with the type with which it was written.
             is_text = isinstance(value, str) or (
                 isinstance(value, list) and isinstance(value[0], str)
             )
@@ -187,7 +187,7 @@ def _attributes_of_array(dataset: Any) -> dict[str, Any]:
 
 
 def chosen_group(path: Path, places: Sequence[str], group: str, scene: str) -> str:
-    """Return the group that a caller of `read_arrays` means.
+    """Return the path of the group that `read_arrays` is asked for.
 
     Parameters
     ----------
@@ -198,7 +198,7 @@ def chosen_group(path: Path, places: Sequence[str], group: str, scene: str) -> s
     Raises
     ------
     StoreError
-        If no group or several groups fit.
+        If no group fits, or several do.
     """
     inside = [place for place in places if place.startswith(f"{scene}/")] or list(places)
     fitting: list[str]
@@ -220,9 +220,9 @@ def chosen_group(path: Path, places: Sequence[str], group: str, scene: str) -> s
 
 
 def _array_places(file: Any) -> dict[str, list[str]]:
-    """Return the names of the arrays of numbers by the path of their group.
+    """Return the names of the arrays that `read_arrays` reads, by the path of their group.
 
-    Groups without any are left out.
+    Groups without such arrays are left out.
 
     Parameters
     ----------

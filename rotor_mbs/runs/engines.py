@@ -1,4 +1,4 @@
-"""Open what runs the tasks of a sweep (`--engine`): processes of this machine or a cluster."""
+"""Open the pool that runs the tasks of a sweep (`--engine`): local processes or a dask cluster."""
 
 from __future__ import annotations
 
@@ -14,49 +14,56 @@ from rotor_mbs.runs.versions import numerics_digest, versions, versions_with
 
 ENGINE_FORMS = "local, or dask:tcp://host:port"
 
-# A task's arrays are as large as the last one's. Memory that a process keeps (with the GNU C
-# library, up to 128 MB) it need not get from the system again, page by page: an eleventh of a fast
+# Settings of the GNU C library with which a process keeps up to 128 MB of memory that it has freed.
+# The arrays of a task are as large as those of the task before. They then reuse this memory instead
+# of getting it from the system again, page by page, which takes an eleventh of the time of a fast
 # run with many samples.
 _KEEP_MEMORY = {"MALLOC_MMAP_THRESHOLD_": str(1 << 25), "MALLOC_TRIM_THRESHOLD_": str(1 << 27)}
 
 
 def open_task_pool(name: str, workers: int) -> TaskPool:
-    """Open what runs the tasks of a sweep.
+    """Open the pool that runs the tasks of a sweep.
 
     Parameters
     ----------
     name : "local", or "dask:tcp://host:port".
-    workers : how many processes of a local engine; 0 for this process.
+    workers : number of local processes; with 0, tasks run in this process. A cluster ignores it.
 
     Raises
     ------
     InputError
-        For another name, and a cluster that cannot be used.
+        If the name is another one, or the cluster cannot be used.
     """
     if name == "local":
         return local_pool(workers, _load, _KEEP_MEMORY)
     if not re.fullmatch(r"dask:tcp://[^\s/:]+:[0-9]{1,5}", name):
         raise InputError(f"engine {name}: no such engine; allowed: {ENGINE_FORMS}")
-    from rotor_mbs.processes.cluster import open_cluster  # late: only for a cluster
+    from rotor_mbs.processes.cluster import open_cluster  # imported late: only a cluster needs it
 
     return open_cluster(name.removeprefix("dask:"), partial(refuse_other_code, identity()))
 
 
 def _load() -> None:
-    """Load what the runs of a sweep compute with, and the fast engine where it is installed."""
-    import_module("rotor_mbs.studies.sweep")  # by its name: only the workers import it
+    """Load the code that computes the runs of a sweep, and heyoka if it is installed."""
+    import_module("rotor_mbs.studies.sweep")  # by its name, as only the workers import it here
     import_module("rotor_mbs.models.lagrange.heyoka_adapter").is_available()
 
 
 def identity() -> dict[str, str]:
-    """Return what must be equal here and in a worker, or its numbers differ: versions and code."""
+    """Return versions and a digest of the code; if a worker has others, its numbers may differ."""
     return {**versions(), "code of rotor_mbs": numerics_digest()}
 
 
 def refuse_other_code(expected: Mapping[str, str]) -> None:
-    """Raise InputError in a worker that has another version of anything that decides a number."""
+    """Raise InputError if this worker has other versions or other code than are expected.
+
+    Parameters
+    ----------
+    expected : `identity` of the process that sends the tasks.
+    """
     here = identity()
-    others = [name for name in expected if name not in here]  # packages of a method's file
+    # Packages that a method file names, which this worker has not loaded.
+    others = [name for name in expected if name not in here]
     here = versions_with(*others) | here
     wrong = []
     for name, version in expected.items():

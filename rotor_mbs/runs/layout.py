@@ -1,4 +1,4 @@
-"""Lay out new HDF5 files: with room for all rows of their tables, or with groups of arrays."""
+"""Lay out new HDF5 files, either with room for all rows of tables or with groups of arrays."""
 
 from __future__ import annotations
 
@@ -35,9 +35,9 @@ from rotor_mbs.runs.untrusted import trust
 
 FORMAT = "rotor_mbs"
 CONVENTIONS = "CF-1.11, ACDD-1.3"
-# What every file is about: the attribute `keywords` of the ACDD conventions.
+# Attribute `keywords` of every results file, which the ACDD conventions ask for.
 KEYWORDS = "multibody dynamics, wind turbine rotor, Euler-Lagrange equations, model verification"
-_HEAD_BYTES = 1 << 17  # at most, of descriptions and texts outside the rows of a file
+_HEAD_BYTES = 1 << 17  # bytes that are reserved for descriptions and texts outside the rows
 
 
 @contextmanager
@@ -46,30 +46,31 @@ def create_file(
 ) -> Iterator[TableFile]:
     """Yield a new file with room for all rows of tables, under a temporary name.
 
-    It gets its name after the block; if the block raises, it is removed. Its space is reserved
-    before HDF5 writes, because HDF5 does not survive a disk that fills up. It is reserved again
-    after the layout, because HDF5 truncates the file when it opens it.
+    The file gets its final name after the block. If the block raises, the file is removed. Space is
+    reserved before HDF5 writes, because HDF5 does not survive a disk that fills up. Space is
+    reserved again after the layout, because HDF5 truncates a file when it creates it.
 
     Parameters
     ----------
-    path : of the file.
-    tables : as they are to be laid out.
-    attributes : of the file.
+    path : final path of the file.
+    tables : the tables that are laid out.
+    attributes : attributes of the file.
 
     Yields
     ------
     TableFile
-        The file under its temporary name.
+        The tables of the file, with its temporary name.
 
     Raises
     ------
     StoreError
-        If it cannot be written, or the disk has no room for it.
+        If the file cannot be written, or the disk has no room for it.
     """
     with replacing(path) as temporary:
         size = _HEAD_BYTES
         for table in tables:
-            # An estimate: 8 bytes for the value of each known column, and for four more values.
+            # Besides the computed columns, a row is estimated to have 8 bytes for each known column
+            # and for four more values.
             row_bytes = table.row_type.itemsize + 8 * (4 + len(table.known))
             size += len(table.runs) * row_bytes
         _reserve(temporary, size)
@@ -83,8 +84,8 @@ def create_file(
             file.seek(0, os.SEEK_END)
             file.write(trailer)
         _reserve(temporary, temporary.stat().st_size)
-        # The tables are made from what was written: to read them from the file would take longer
-        # than to write it.
+        # The tables are made from the values that were written, because reading the file would take
+        # longer than writing it.
         inode = temporary.stat().st_ino
         laid_tables = []
         for table in tables:
@@ -99,8 +100,8 @@ def create_file(
 def _reserve(path: Path, size: int) -> None:
     """Reserve space on the disk for a file of `size` bytes. Raises OSError.
 
-    The system and the file system must support it. macOS and Windows do not: there a full disk is
-    reported by the row that cannot be written.
+    Nothing is reserved if the system or the file system cannot do it. macOS and Windows cannot:
+    there a full disk is noticed only when a row cannot be written.
     """
     with path.open("ab") as file:
         try:
@@ -113,17 +114,17 @@ def _reserve(path: Path, size: int) -> None:
 
 
 def _put_table(file: Any, table: TableSpec) -> dict[str, tuple[int, int]]:
-    """Write the layout of a table, and return where its computed columns are.
+    """Write the layout of a table, and return the locations of its computed columns.
 
     Parameters
     ----------
     file : an HDF5 file that is open for writing.
-    table : the table; its computed columns are empty, the others are written.
+    table : the table. Its known columns are written; its computed columns only get space.
 
     Returns
     -------
     dict of (int, int)
-        Offset and length in bytes by name of the column.
+        Offset and length in bytes, by name of the computed column.
     """
     group = new_group(file, table.group) if table.group else file
     put_attributes(group, table.attributes)
@@ -141,9 +142,9 @@ def _put_table(file: Any, table: TableSpec) -> dict[str, tuple[int, int]]:
 
 
 def begin_file(place: Path | str, **driver: object) -> Any:
-    """Create an HDF5 file with the attributes of the format.
+    """Create an HDF5 file with the attributes of this program's format.
 
-    Without a `driver` it is on the disk, which must not fill up.
+    Without a `driver` the file is on the disk, where its space must be reserved before.
     """
     file = h5py.File(place, "w", libver=("earliest", "v108"), track_order=True, **driver)
     file.attrs["Conventions"] = CONVENTIONS
@@ -154,9 +155,9 @@ def begin_file(place: Path | str, **driver: object) -> Any:
 
 
 def new_group(parent: Any, name: str) -> Any:
-    """Return a group, created with those above it unless they exist.
+    """Return a group by its path; it and the groups above it are created if they do not exist.
 
-    New groups list their members in the order of writing.
+    A new group lists its members in the order of writing.
     """
     for part in name.split("/"):
         parent = parent[part] if part in parent else parent.create_group(part, track_order=True)
@@ -166,20 +167,21 @@ def new_group(parent: Any, name: str) -> Any:
 def put(group: Any, name: str, values: Any, column: Column) -> Any:
     """Write a dataset of numbers or texts.
 
-    The scales of its dimensions must exist; a scale is its own dimension.
+    A dataset with the name of its only dimension becomes a scale. For any other dataset, the scales
+    of its dimensions must exist.
     """
     dataset = group.create_dataset(name, data=_as_stored(values))
     return _describe(dataset, group, name, column)
 
 
 def _as_stored(values: Any) -> NDArray[Any]:
-    """Return numbers or texts as a reader of the file gets them."""
+    """Return numbers or texts as the array that a reader of the file gets."""
     is_text = len(values) > 0 and isinstance(values[0], str)
     return np.array(list(values), dtype=TEXT) if is_text else np.asarray(values)
 
 
 def _describe(dataset: Any, group: Any, name: str, column: Column) -> Any:
-    """Write a dataset's attributes, attach the scales of its dimensions, and return it."""
+    """Write the attributes of a dataset, attach its scales, and return the dataset."""
     put_attributes(
         dataset, {"units": column.units, "long_name": column.long_name, **column.attributes}
     )
@@ -209,15 +211,14 @@ def put_empty(
 
     Parameters
     ----------
-    group, name : where it is created.
-    shape, kind : of its values.
-    column : its dimensions and description.
-    fill : first value of all entries; by default zeros, which the file system returns for a new
-        file.
+    group, name : the group in which the dataset is created, and its name.
+    shape, kind : shape and type of the values.
+    column : dimensions and description of the dataset.
+    fill : initial value of all entries. By default none is written, and a reader gets zeros.
     """
     layout = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
     layout.set_layout(h5py.h5d.CONTIGUOUS)
-    layout.set_obj_track_times(False)  # the same call gives the same bytes
+    layout.set_obj_track_times(False)  # without times, the same call writes the same bytes
     layout.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
     layout.set_fill_time(h5py.h5d.FILL_TIME_NEVER if fill is None else h5py.h5d.FILL_TIME_ALLOC)
     if fill is not None:
@@ -235,13 +236,13 @@ def put_attributes(target: Any, values: Mapping[str, object]) -> None:
     Parameters
     ----------
     target : the HDF5 object.
-    values : by name. Numbers are stored as float64 or int64, booleans as int8 (netCDF-4 has none),
-        lists of names as texts.
+    values : values of the attributes by name. Numbers are stored as float64 or int64, booleans as
+        int8 (netCDF-4 has no booleans), lists as texts, and arrays with their own type.
     """
     for name, value in values.items():
         if isinstance(value, str):
-            # Nearly all attributes are single texts. `attrs` of h5py takes three times as long for
-            # them.
+            # Nearly all attributes are single texts. `attrs` of h5py takes three times as long to
+            # write them.
             stored = h5py.h5a.create(
                 target.id, name.encode(), TEXT_TYPE, h5py.h5s.create(h5py.h5s.SCALAR)
             )
@@ -258,14 +259,14 @@ def put_attributes(target: Any, values: Mapping[str, object]) -> None:
 def new_file(path: Path, kind: str) -> Iterator[Any]:
     """Yield an HDF5 file in memory, which is written to `path` after the block.
 
-    HDF5 makes the file in memory, because it does not survive a disk that fills up; a plain write
-    does. If the file cannot be written, an earlier file at `path` is unchanged. Whether that may be
-    replaced must be decided before, by `may_extend`.
+    HDF5 makes the file in memory, because HDF5 does not survive a disk that fills up. If the file
+    cannot be written, an earlier file at `path` is unchanged. The caller must ask `may_extend`
+    before whether an earlier file may be replaced.
 
     Parameters
     ----------
-    path : of the file.
-    kind : of the file, for its trailer.
+    path : path of the file.
+    kind : kind of the file, which is stored in its trailer.
 
     Raises
     ------
@@ -288,7 +289,7 @@ def new_file(path: Path, kind: str) -> Iterator[Any]:
 
 
 def _groups_with_arrays(group: Any, path: str = "") -> Iterator[str]:
-    """Yield the path of the group of each array below a group, in the order of writing."""
+    """Yield for each array below a group the path of the array's own group, in order of writing."""
     for name, item in group.items():
         if is_group(item):
             yield from _groups_with_arrays(item, f"{path}/{name}" if path else name)
