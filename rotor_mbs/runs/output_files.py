@@ -1,7 +1,7 @@
 """Write output files of every kind.
 
-A file has a temporary name until it is complete, does not replace the file of another program, and
-is written by one process at a time.
+A file has a temporary name until it is complete. It does not replace a file of another program, and
+only one process writes it at a time.
 """
 
 from __future__ import annotations
@@ -20,29 +20,30 @@ from rotor_mbs.errors import InputError, StoreError
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer as Buffer
 
-_LARGEST_REPLACED = 1 << 28  # bytes; larger files that are not HDF5 are not replaced
-# Content of a lock file; it is empty if its process was killed before it wrote.
+_LARGEST_REPLACED = 1 << 28  # bytes; a larger file that is not HDF5 is not replaced
+# Content of a lock file. The file is empty if its process was killed before it wrote the content.
 _OWNER = rb"(process [0-9]+ on [!-~]*)?\Z"
 
 
-# The lock is a file beside the output. It is removed when the output is written.
+# A lock is a file beside the output. It is removed after the output has been written.
 
 
 @contextmanager
 def locked(output: Path) -> Iterator[None]:
-    """Keep other processes from writing a file in the block.
+    """Lock a file during the block, so that no other process writes it.
 
-    The thread may enter the lock of the same file again. Temporary files of processes that were
-    killed are removed.
+    The thread that has the lock may enter it again. Temporary files of the output that killed
+    processes have left are removed.
 
     Parameters
     ----------
-    output : the file; a symbolic link and the file that it points to have one lock.
+    output : the file. A symbolic link and the file that it points to have the same lock.
 
     Raises
     ------
     InputError
-        If another process is writing the file, or its lock file is not one of this program.
+        If another process is writing the file, or another program wrote a file with the name of the
+        lock file.
     StoreError
         If the lock file cannot be written.
     """
@@ -51,7 +52,7 @@ def locked(output: Path) -> Iterator[None]:
     file = _resolved(output)
     path = _lock_of(file)
     lock = FileLock(path, timeout=0, is_singleton=True)
-    if lock.is_locked:  # by this thread: a study takes the lock, and so does what it calls
+    if lock.is_locked:  # by this thread: a study takes the lock, as do functions that it calls
         yield
         return
     owner = b""
@@ -77,13 +78,13 @@ def locked(output: Path) -> Iterator[None]:
     except OSError as exc:
         raise StoreError(f"{output}: cannot be written: {exc.strerror}") from exc
     try:
-        # Incomplete files of processes that were killed: no other process writes this output now.
+        # Killed processes have left these temporary files: nothing else writes this output now.
         temporary = re.compile(rf"\.{re.escape(file.name)}\.([0-9]+\.)?tmp")
         for beside in file.parent.iterdir():
             if temporary.fullmatch(beside.name):
                 with suppress(OSError):
                     beside.unlink()
-        with suppress(OSError):  # a full disk is reported by what is written to the output
+        with suppress(OSError):  # if the disk is full, this is reported when the output is written
             path.write_text(f"process {os.getpid()} on {socket.gethostname()}")
         yield
     finally:
@@ -102,7 +103,7 @@ def _lock_of(file: Path) -> Path:
 
 
 def _resolved(output: Path) -> Path:
-    """Return the file itself where the output is a symbolic link: both names are one output."""
+    """Return the absolute path of an output; if it is a symbolic link, that of its target."""
     try:
         return output.resolve() if output.is_symlink() else Path(os.path.abspath(output))  # noqa: PTH100  (links stay)
     except (OSError, RuntimeError) as exc:  # links in a circle, a working folder that is gone
@@ -122,9 +123,9 @@ def store_errors(path: object) -> Iterator[None]:
 
 
 def replace_file(path: Path, content: Buffer, mark: bytes) -> None:
-    """Write a file, which may replace only an earlier output of the same kind.
+    """Write a file; an earlier file is replaced only if it is an output of the same kind.
 
-    See `write_file` and `refuse_foreign`. Raises InputError, StoreError.
+    See `refuse_foreign` and `write_file`. Raises InputError, StoreError.
     """
     refuse_foreign(path, mark)
     write_file(path, content)
@@ -133,18 +134,18 @@ def replace_file(path: Path, content: Buffer, mark: bytes) -> None:
 def write_file(path: Path, content: Buffer) -> None:
     """Write a file under a temporary name, force it to the disk, then rename it.
 
-    A symbolic link stays, and the file that it points to is replaced; a device or a pipe is written
-    to.
+    If `path` is a symbolic link, the link stays, and its target is replaced. If `path` is a device
+    or a pipe, the content is written to it directly.
 
     Parameters
     ----------
-    path : of the file.
-    content : bytes.
+    path : path of the file.
+    content : content of the file as bytes.
 
     Raises
     ------
     StoreError
-        If it cannot be written; an earlier file is then unchanged.
+        If the file cannot be written; an earlier file is then unchanged.
     """
     # A device or a pipe, such as /dev/stdout, must not be replaced by a file.
     if path.exists() and not path.is_file() and not path.is_dir():
@@ -161,21 +162,21 @@ def write_file(path: Path, content: Buffer) -> None:
 
 
 def refuse_foreign(path: Path, mark: bytes) -> None:
-    """Raise InputError if a file is not an output of this program of the kind to be written.
+    """Raise InputError if a file must not be replaced, as it is not an output of the same kind.
 
     This is for outputs that are no HDF5 files. An empty file may be replaced.
 
     Parameters
     ----------
     path : the file, which may not exist.
-    mark : a regular expression that is found in every output of the kind.
+    mark : regular expression that every output of the kind contains.
 
     Raises
     ------
     InputError
-        If the file is larger than any output, or has no such mark.
+        If the file is larger than any output, or does not contain the mark.
     StoreError
-        If it cannot be read.
+        If the file cannot be read.
     """
     if not path.is_file():
         return
@@ -195,8 +196,8 @@ def refuse_foreign(path: Path, mark: bytes) -> None:
 def replacing(path: Path) -> Iterator[Path]:
     """Yield the name of a new, empty file that replaces `path` after the block.
 
-    It is in the same folder. Its name cannot be guessed, and an existing file or link of that name
-    is not opened. If the block raises, `path` is unchanged.
+    The new file is in the same folder. Its name cannot be guessed, and an existing file or link of
+    that name is not opened. If the block raises, `path` is unchanged.
 
     Parameters
     ----------
@@ -216,7 +217,7 @@ def replacing(path: Path) -> Iterator[Path]:
         try:
             yield temporary
             temporary.replace(path)
-            with suppress(OSError):  # the new name is durable, where the system can make it so
+            with suppress(OSError):  # makes the new name durable, if the system supports it
                 folder = os.open(path.parent, os.O_RDONLY)
                 try:
                     os.fsync(folder)

@@ -1,9 +1,10 @@
 """Show the progress of long calls.
 
-It is one line that is overwritten on a terminal or in a notebook, or plain lines in a log.
+Progress is one line that is overwritten on a terminal or in a notebook, or plain lines in a log.
 
-What is left is estimated from the work of the runs, which differs a thousandfold, and a run that
-failed keeps its line: tqdm counts iterations, and needs ipywidgets in a notebook.
+The remaining time is estimated from the work of the runs, which differs a thousandfold, and the
+line of a run that failed stays. tqdm is not used: it estimates from the number of iterations, and
+needs ipywidgets in a notebook.
 """
 
 from __future__ import annotations
@@ -22,20 +23,22 @@ from typing import TYPE_CHECKING, Any, Self, TextIO
 from rotor_mbs.errors import printable
 from rotor_mbs.solution.status import GOOD, STATUSES
 
-if TYPE_CHECKING:  # a sweep's workers load their code meanwhile
+if TYPE_CHECKING:  # the runner is imported later, while the workers of a sweep load their code
     from rotor_mbs.runs.runner import RunOutcome
 
-# How a status is coloured on a terminal: well; open to doubt; anything else went wrong.
+# ANSI codes of the colours of statuses on a terminal: "ok" is green, and statuses of doubtful runs
+# are yellow. All other statuses have the colour _BAD, red.
 _COLOURS = {"ok": "32", "inaccurate": "33", "unchecked": "33"}
 _BAD = "31"
-_RENEWED_S, _LOGGED_S = 0.1, 10.0  # between two lines of a stage, renewed and in a log
+# Shortest time in s between two lines of a stage: on a terminal or in a notebook, and in a log.
+_RENEWED_S, _LOGGED_S = 0.1, 10.0
 _STATUS = re.compile(rf"\b({'|'.join((*STATUSES, 'no_reference'))})\b")
 
 
 def coloured(text: str, stream: TextIO) -> str:
     """Return a text with each status in its colour.
 
-    Nothing is coloured unless the stream is a terminal, and the user has not set NO_COLOR
+    The text is returned unchanged if the stream is no terminal, or the user has set NO_COLOR
     (https://no-color.org).
     """
     if not stream.isatty() or "NO_COLOR" in os.environ:
@@ -44,7 +47,7 @@ def coloured(text: str, stream: TextIO) -> str:
 
 
 def span(seconds: float) -> str:
-    """Return a duration as text in a suitable unit, "2.5 h"."""
+    """Return a duration as text in a suitable unit, such as "2.5 h"."""
     for length, unit in ((86400.0, "days"), (3600.0, "h"), (60.0, "min")):
         if seconds >= 2.0 * length:
             return f"{seconds / length:.1f} {unit}"
@@ -54,8 +57,8 @@ def span(seconds: float) -> str:
 class ProgressLine:
     """A context manager that shows progress: one line on a terminal, or plain lines in a log.
 
-    The line on a terminal is overwritten, and cleared at the end. The object is called after each
-    run. The remaining time is estimated from the work done, not from the number of runs.
+    The line on a terminal is overwritten, and cleared at the end. The runner calls the object after
+    each run. The remaining time is estimated from the work done, not from the number of runs.
     """
 
     def __init__(self, stream: TextIO | None = None) -> None:
@@ -85,13 +88,19 @@ class ProgressLine:
         text = (
             f"[{done:{len(str(total))}d}/{total}] {outcome.label} {outcome.status}{seconds}{reason}"
         )
-        keep = outcome.status not in (*GOOD, "measured")  # a person must not miss it
+        keep = outcome.status not in (*GOOD, "measured")  # a failure must not be overlooked
         self._show(text if keep else self._estimate(outcome.share) + text, keep=keep)
 
     def stage(self, name: str, done: int, total: int, note: str = "") -> None:
         """Show the progress of a stage whose parts have no outcomes, such as drawing pages.
 
-        It is called before the first part and after each.
+        Call it before the first part and after each part.
+
+        Parameters
+        ----------
+        name : name of the stage.
+        done, total : number of parts that are done, and of all parts.
+        note : text that is added to the line.
         """
         now = time.monotonic()
         if name != self._stage:
@@ -104,8 +113,12 @@ class ProgressLine:
     def runs(self, done: int, total: int, statuses: Counter[str]) -> None:
         """Show how many runs of a sweep have been computed, and how many failed with which status.
 
-        It is called before the first block of runs and after each; `statuses` are those of the
-        block.
+        Call it before the first block of runs and after each block.
+
+        Parameters
+        ----------
+        done, total : number of runs that are stored, and of all runs.
+        statuses : number of runs of the block with each status.
         """
         self._statuses.update(statuses)
         failed = [
@@ -116,14 +129,14 @@ class ProgressLine:
         self.stage("runs", done, total, "".join(failed))
 
     def _estimate(self, share: float) -> str:
-        """Return "40%, about 20 s left  ", or "" in a log or without an estimate."""
+        """Return a text such as "40%, about 20 s left  "; "" in a log or without an estimate."""
         if not self._is_live or not self._share_before < share < 1.0:
             return ""
         left = (self._last - self._stage_start) / (share - self._share_before) * (1.0 - share)
         return f"{share:4.0%}, about {span(left)} left  "
 
     def _show(self, text: str, *, keep: bool = False) -> None:
-        """Show a text; with `keep` it stays on the terminal in full length."""
+        """Show a text; if `keep` is set, it stays on the terminal in full length."""
         text = printable(text)
         if not self._is_live:
             self._print(text)
@@ -150,9 +163,9 @@ class ProgressLine:
 
 
 class NotebookLine(ProgressLine):
-    """A line below a cell of a Jupyter notebook that is overwritten.
+    """A progress line below a cell of a Jupyter notebook.
 
-    At the end it shows how long the call took.
+    The line is overwritten, and shows at the end how long the call took.
     """
 
     def __init__(self) -> None:
@@ -200,12 +213,12 @@ def progress_of_call(progress: bool | None) -> ProgressLine:
 
     Parameters
     ----------
-    progress : whether to show it; None: on a terminal and in a notebook, but not in a script whose
-        messages go to a file.
+    progress : whether progress is shown. With None it is shown on a terminal and in a notebook, but
+        not in a script whose messages go to a file.
     """
     if progress is False:
         return SilentProgress()
-    # A notebook's streams are no terminals: its kernel brings its own.
+    # The streams of a notebook are no terminals. They are recognized by the kernel's package.
     if type(sys.stdout).__module__.startswith("ipykernel"):
         return NotebookLine()
     if sys.stderr is None or (progress is None and not sys.stderr.isatty()):

@@ -1,7 +1,7 @@
 """Encode rows of a table as bytes, and write and read them at their offsets in a file.
 
-A row has a checksum. Its bytes are written to their offsets, its status after a sync: a row is
-stored if its status is not -1 and its checksum is right.
+A row has a status and a checksum. Its status is written last, after a sync of its other columns. A
+row counts as stored if its status is not -1 and its checksum is right.
 """
 
 from __future__ import annotations
@@ -25,21 +25,21 @@ from rotor_mbs.runs.output_files import store_errors
 from rotor_mbs.solution.status import STATUSES, code_of
 from rotor_mbs.solution.trajectory import Solution
 
-# (rows, ...) arrays by the name of their dataset.
+# Columns of one or more rows: arrays of shape (rows, ...) by name of the column.
 Rows = dict[str, NDArray[Any]]
 
 
 @dataclass(frozen=True)
 class RowLocation:
-    """Location of consecutive rows in a file, by which worker processes write them.
+    """Location of consecutive rows in a file, by which worker processes write the rows.
 
     Attributes
     ----------
     path : the file.
-    inode : of the file; another file of that name is not written to.
-    first : number of the first row, the initial value of its checksum.
-    offsets : bytes from the beginning of the file to the first row, by column.
-    row_type : its columns are in the order in which the checksum covers them.
+    inode : inode of the file. A file that has replaced it under its name is not written to.
+    first : number of the first row, with which the checksum of that row begins.
+    offsets : for each column, bytes from the beginning of the file to the value of the first row.
+    row_type : type of a row; its columns are in the order in which the checksum covers them.
     """
 
     path: Path
@@ -49,12 +49,12 @@ class RowLocation:
     row_type: np.dtype[np.void]
 
     def encode(self, values: Mapping[str, object], count: int = 1) -> Rows:
-        """Return rows that all have the same values.
+        """Return the columns of rows that all have the same values.
 
         Parameters
         ----------
-        values : by name of the column: a number, a text, the name of a status, or the first samples
-            of an array. Other names are ignored; columns without a value are blank.
+        values : values by name of the column: a number, a text, a status, or the first samples of
+            an array. Values that have no column are ignored; columns that have no value are blank.
         count : number of rows.
 
         Returns
@@ -77,7 +77,7 @@ class RowLocation:
         return rows
 
     def at(self, row: int) -> RowLocation:
-        """Return the location of a later row, counted from the first."""
+        """Return the location that begins `row` rows after the first row."""
         offsets = {
             name: offset + row * self.row_type[name].itemsize
             for name, offset in self.offsets.items()
@@ -87,11 +87,12 @@ class RowLocation:
     def write(self, rows: Rows) -> None:
         """Write consecutive rows into the file.
 
-        While they are written their statuses are MISSING; these are written last, after a sync.
+        The statuses in the file are MISSING while the other columns are written. The new statuses
+        are written last, after a sync.
 
         Parameters
         ----------
-        rows : the columns without the checksum, which is added.
+        rows : the columns of the rows; their checksums are computed here.
 
         Raises
         ------
@@ -107,14 +108,15 @@ class RowLocation:
         with store_errors(self.path), self.path.open("r+b") as file:
             if os.fstat(file.fileno()).st_ino != self.inode:
                 raise StoreError(f"{self.path}: has been replaced by another file")
-            # Missing until all is written: a reader must not take a part of a row for the whole.
+            # The rows are missing until all columns are written: a reader must not take a part of a
+            # row for the whole row.
             for name, status in statuses.items():
                 file.seek(self.offsets[name])
                 file.write(np.full(len(status), MISSING, np.int8).data)
             for name, values in columns.items():
                 file.seek(self.offsets[name])
                 file.write(np.ascontiguousarray(values).data)
-            # The columns are on the disk before a status says so.
+            # The columns must be on the disk before a status marks the row as stored.
             file.flush()
             os.fsync(file.fileno())
             for name, status in statuses.items():
@@ -122,9 +124,9 @@ class RowLocation:
                 file.write(np.ascontiguousarray(status, np.int8).data)
 
     def read(self, count: int = 1, file: IO[bytes] | None = None) -> Rows:
-        """Read the columns of `count` rows, each (count, ...).
+        """Read the columns of the first `count` rows, each (count, ...), without verifying them.
 
-        `file` is the file if it is open already. Raises OSError, ValueError.
+        `file` is the open file; if it is None, the file is opened. Raises OSError, ValueError.
         """
         with nullcontext(file) if file is not None else self.path.open("rb") as source:
             rows = {}
@@ -136,7 +138,7 @@ class RowLocation:
         return rows
 
     def statuses(self, count: int = 1) -> NDArray[np.int8]:
-        """Return the verified statuses of `count` rows, (count,) int8.
+        """Return the verified statuses of the first `count` rows, (count,) int8.
 
         A status is MISSING if the row is not stored, or its checksum is wrong.
         """
@@ -152,7 +154,17 @@ class RowLocation:
         return bool(self.statuses()[0] != MISSING)
 
     def mark_missing(self, rows: Collection[int]) -> None:
-        """Mark rows as missing before they are computed again; 0 is the location's first row."""
+        """Mark rows as missing before they are computed again.
+
+        Parameters
+        ----------
+        rows : numbers of the rows, counted from 0 at the first row of this location.
+
+        Raises
+        ------
+        StoreError
+            If the file cannot be written.
+        """
         with store_errors(self.path), self.path.open("r+b") as file:
             for row in rows:
                 for name in ("status", STATUS_COPIES["status"]):
@@ -164,8 +176,16 @@ class RowLocation:
 
 
 def checksums(first: int, rows: Rows, row_type: np.dtype[np.void]) -> NDArray[np.uint32]:
-    """Return the CRC-32 of each row over its number and its columns, (rows,) uint32."""
-    # The initial value is the number of the row, so that a row in the place of another is detected.
+    """Return the CRC-32 of each row over its number and its columns, (rows,) uint32.
+
+    Parameters
+    ----------
+    first : number of the first row.
+    rows : columns of the rows.
+    row_type : type of a row, in the order of the checksum.
+    """
+    # The initial value is the number of the row, so that a row at the location of another one is
+    # detected.
     sums = [(first + i) & 0xFFFFFFFF for i in range(len(rows["status"]))]
     for name in row_type.names or ():
         if name == "crc32":
@@ -192,7 +212,7 @@ def characters(text: str, length: int) -> NDArray[np.bytes_]:
 
 
 def text_of(values: NDArray[np.bytes_]) -> str:
-    """Return the text in an array of `characters`."""
+    """Return the text in an array that `characters` has returned."""
     return values.tobytes().rstrip(b"\0").decode(errors="ignore")
 
 
@@ -202,7 +222,7 @@ def row_of_run(run: Solution, place: RowLocation, facts: Mapping[str, object]) -
     Parameters
     ----------
     run : the run.
-    place : location of the row, with its columns.
+    place : location of the row; it has the columns that are filled.
     facts : further values by name of the column.
     """
     integration = run.integration
@@ -210,7 +230,8 @@ def row_of_run(run: Solution, place: RowLocation, facts: Mapping[str, object]) -
     run_times_s = run.run_times_s or [math.nan]
     arrays = dict(run.quantities)
     if run.method == REFERENCE:
-        # A reference is read back by its angles and rates, whatever the scene asks for.
+        # Angles and rates of a reference are always stored, as it is rebuilt from them when it is
+        # read.
         arrays |= {"angles": run.angles, "rates": run.rates}
     return place.encode(
         {
