@@ -1,11 +1,11 @@
 """Write and read the file of a sweep, which has one table at its root.
 
-run, variant, method_code, split   (run) which run this is
+run, variant, method_code, split   (run) numbers and codes that identify a run
 bearing_stiffness ...              (run) a variable for each varied parameter, in its own unit
-status, steps, message ...         (run) metrics
-code                               (run) which versions computed it
-angles ...                         (run, time, coordinate) trajectories, as asked for; NaN after a
-                                   run broke off
+status, steps, message ...         (run) outcome and metrics of a run
+code                               (run) CRC-32 of the versions that computed a run
+angles ...                         (run, time, coordinate) requested trajectories; NaN after the end
+                                   of a run that stopped early
 """
 
 from __future__ import annotations
@@ -39,7 +39,8 @@ from rotor_mbs.solution import quantities
 from rotor_mbs.solution.quantities import SCALES
 from rotor_mbs.solution.status import code_of
 
-# bytes; the longest message seen has 242, of a singularity that ode45 does not pass
+# Length of a message in bytes. The longest message seen has 242: it reports a singularity that
+# ode45 does not pass.
 MESSAGE_LENGTH = 256
 
 COLUMNS_OF_A_RUN = columns_in("sweep")
@@ -56,20 +57,20 @@ def parameter_name(key: str) -> str:
 
 
 def code_of_method(method: str) -> int:
-    """Return a CRC-32 of the versions that a run by this method has now."""
+    """Return the CRC-32 of the versions with which a method would compute a run now."""
     return zlib.crc32(json.dumps(row_versions(find_method(method)), sort_keys=True).encode())
 
 
 def sweep_table(sweep: Sweep, methods: Sequence[str], numbers: range) -> TableSpec:
     """Return the table of a range of runs of a sweep.
 
-    Run r is row r mod rows of the design, by method r div rows.
+    If the design has n rows, run r is row r mod n of the design, by method number r div n.
 
     Parameters
     ----------
-    sweep : the design, its keys and its outputs.
+    sweep : the sweep: a scene, the design, its keys and its outputs.
     methods : names of the methods, in the order of their codes.
-    numbers : of the runs, a range with step 1.
+    numbers : numbers of the runs, a range with step 1.
     """
     runs, rows, options = np.arange(numbers.start, numbers.stop), sweep.design.count, sweep.design
     known: dict[str, tuple[Column, Any]] = {}
@@ -96,7 +97,7 @@ def sweep_table(sweep: Sweep, methods: Sequence[str], numbers: range) -> TableSp
         for quantity in asked
     }
     computed = COLUMNS_OF_A_RUN | trajectories
-    if options.error_growth:  # the variational equations cost a hundred times the run itself
+    if options.error_growth:  # optional: it takes a hundred times as long as the run itself
         computed = COLUMNS_OF_A_RUN | columns_in("sweep_growth") | trajectories
     known = scene_scales(sweep.base, trajectories.values()) | known
     return TableSpec("", runs, known, computed, characters=MESSAGE_LENGTH)
@@ -111,33 +112,35 @@ def open_sweep(
     *,
     fresh: bool = False,
 ) -> Iterator[tuple[StoredTable, NDArray[np.int8]]]:
-    """Open the file of a sweep, which no other process writes in the block.
+    """Open the file of a sweep, and lock it during the block.
 
-    It is laid out if it does not exist, and removed after the block if nothing was stored in a new
-    file.
+    A file that does not exist is laid out. This new file is removed after the block if no run was
+    stored in it.
 
     Parameters
     ----------
     output : the file.
-    table : the table of its runs.
-    attributes : of a new file; the identity of the sweep among them must be that of the file.
-    time_limit_s : runs that were ended by a shorter limit, in s, count as missing.
+    table : the table of the sweep's runs.
+    attributes : attributes of a new file. An existing file must have the same sweep identity.
+    time_limit_s : time limit of a run in s. A stored run that a shorter limit ended counts as
+        missing.
     fresh : whether all runs are to be computed. A stored run stays until it is replaced.
 
     Yields
     ------
     StoredTable, (runs,) int8
-        The table, and the status of each run, MISSING if it is to be computed.
+        The table, and the status of each run, MISSING if the run is to be computed. The caller
+        enters the statuses of runs that it has stored.
 
     Raises
     ------
     InputError
         If the file is of another kind or another sweep, or another process is writing it.
     StoreError
-        If it cannot be read or written, or the disk has no room for all runs.
+        If the file cannot be read or written, or the disk has no room for all runs.
     """
     with locked(output):
-        path = output.resolve() if output.is_symlink() else output  # a link stays one
+        path = output.resolve() if output.is_symlink() else output  # a symbolic link is kept
         is_new = not may_extend(path, SWEEP)
         if is_new:
             with create_file(path, [table], attributes):
@@ -157,14 +160,14 @@ def open_sweep(
             (statuses == code_of("timed_out")) & (stored.column("time_limit_s") < time_limit_s)
         ] = MISSING
         taken_back = np.flatnonzero((stored.column("status") != MISSING) & (statuses == MISSING))
-        stored.place().mark_missing(taken_back.tolist())  # readers see it, too
+        stored.place().mark_missing(taken_back.tolist())  # for readers of the file, too
         if fresh:
             statuses[:] = MISSING
         try:
             yield stored, statuses
         finally:
             if is_new and (statuses == MISSING).all():
-                path.unlink(missing_ok=True)  # a sweep that stored nothing leaves nothing
+                path.unlink(missing_ok=True)  # a sweep that stored no run leaves no file
 
 
 class StoredSweep:
@@ -172,10 +175,12 @@ class StoredSweep:
 
     Attributes
     ----------
-    columns : every dataset by name, scales included.
-    keys : of the varied parameters.
+    attributes : attributes of the file.
+    columns : descriptions of all columns and scales, by name.
+    keys : keys of the varied parameters.
     damaged_runs : numbers of the stored runs whose checksums are wrong.
-    subsets, group : as of `StoredRuns`: runs are not selected by scene, and arrays are at the root.
+    subsets : always empty, as all runs vary the same scene; see `StoredRuns`.
+    group : always "", as the arrays are at the root of the file; see `StoredRuns`.
     """
 
     subsets: Sequence[str] = ()
@@ -187,12 +192,12 @@ class StoredSweep:
         Parameters
         ----------
         path : the file.
-        allow_damaged_runs : whether damaged runs raise no error.
+        allow_damaged_runs : if set, damaged runs raise no error; they are in `damaged_runs`.
 
         Raises
         ------
         StoreError
-            If the file is no sweep's, or is damaged.
+            If the file is not that of a sweep, or is damaged.
         """
         self._path = path
         file = TableFile(path, [""])
@@ -218,7 +223,10 @@ class StoredSweep:
             )
 
     def _check(self) -> None:
-        """Raise StoreError if something that every sweep has is missing or inconsistent."""
+        """Set `shape` and `settings`, and check attributes and columns that every sweep has.
+
+        Raises StoreError if one of them is missing or inconsistent.
+        """
         table, place = self._table, str(self._path)
         texts = ("title", "summary", "sweep_toml", "base_scene", "scene_toml", "scene_hash")
         require_texts(self.attributes, texts, place)
@@ -230,7 +238,7 @@ class StoredSweep:
                 or not all(isinstance(one, str) for one in names)
             ):
                 raise StoreError(f"{place}: its attribute {name} is no list of texts; damaged")
-        self.shape = parsed(self.attributes.get("shape"), list, place)  # of a grid, slowest first
+        self.shape = parsed(self.attributes.get("shape"), list, place)  # of a grid; axis 0 is slowest
         self.settings = parsed(self.attributes.get("settings"), dict, place)
         columns = sorted({*COLUMNS_OF_A_RUN} - {*table.computed})
         if columns:
@@ -253,7 +261,7 @@ class StoredSweep:
 
     @functools.cached_property
     def _stored_rows(self) -> NDArray[np.intp]:
-        """Return the rows of the stored runs."""
+        """Return the row numbers of the stored runs."""
         return np.flatnonzero(np.asarray(self._table.column("status")) != MISSING)
 
     @property
@@ -269,12 +277,12 @@ class StoredSweep:
 
     @property
     def title(self) -> str:
-        """Return a title for a sweep without a file of the user."""
+        """Return the title that is shown for a sweep in a temporary file, in place of the path."""
         return f"sweep of {self.base_scene.label}"
 
     @contextmanager
     def opened_run(self, label: int) -> Iterator[StoredRun]:
-        """Yield the run with a number, as `StoredRuns.opened_run` yields that of a label."""
+        """Yield the run with the number `label`; it replaces `StoredRuns.opened_run`."""
         with reading(self._path):
             yield self.run(int(label))
 
@@ -297,14 +305,14 @@ class StoredSweep:
         return names
 
     def column(self, name: str) -> NDArray[Any]:
-        """Return a dataset; a computed one is read from the file when it is indexed.
+        """Return a column or a scale; a computed column is read when it is indexed.
 
-        Raises StoreError if there is none of that name.
+        Raises StoreError if there is no column of that name.
         """
         return self._table.column(name)
 
     def scene_of(self, number: int) -> Scene:
-        """Return the scene of the run with a number, at the samples that are stored."""
+        """Return the scene of the run with a number; its samples are those that are stored."""
         row = self._row_of(number)
         values = {key: float(self.column(parameter_name(key))[row]) for key in self.keys}
         return self.base_scene.replace(**values, samples=len(self.column("time")))

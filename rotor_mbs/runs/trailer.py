@@ -1,17 +1,17 @@
 """Write and check the trailer of a file, which follows the HDF5 content.
 
-It has the locations of the rows, and a digest of every other byte:
+The trailer has the locations of the rows, and a digest of everything else in the file:
 
-    HDF5 | JSON | its length, 8 bytes | SHA-256, 32 bytes | MAGIC
+    HDF5 | JSON | length of the JSON, 8 bytes | SHA-256, 32 bytes | MAGIC
 
-The JSON has `format_version`, `kind`, and `groups`: by group, by name of each computed column,
-offset and length in bytes of its rows, in the order in which the checksum of a row covers them. The
-digest covers all that stands before it, but for these rows, which have checksums of their own: it
-is right from the layout on, whichever rows are filled.
+The JSON has `format_version`, `kind` and `groups`. `groups` has the offset and the length in bytes
+of each computed column by group, then by name, in the order in which the checksum of a row covers
+the columns. The digest covers all bytes before it except the computed columns, whose rows have
+their own checksums. The digest therefore stays right when rows are written.
 
-A flipped bit can make the HDF5 library hang, or end the process: a file is opened only after its
-trailer was checked. This is done anew each time, since it is cheap: rows, nearly all of a large
-file, are not hashed.
+A flipped bit can make the HDF5 library hang, or end the process. A file is therefore opened only
+after its trailer was checked. The check is repeated each time a file is opened. It is fast, because
+it skips the rows, which are nearly all of a large file.
 """
 
 from __future__ import annotations
@@ -28,11 +28,13 @@ from rotor_mbs.errors import InputError, StoreError
 
 FORMAT_VERSION = 3
 MAGIC = b"rmbs-end"
-# The attribute `integrity` of every file: how it is checked. It also identifies a file without its
-# trailer.
+# Attribute `integrity` of every file, which tells how the file is checked. It also identifies a
+# file that has lost its trailer.
 INTEGRITY = "CRC-32 of each row; SHA-256 of the rest, behind the end of HDF5"
 RESULTS, SWEEP, MODES, COMPARISON = "results", "sweep", "modes", "comparison"
-SPLIT_OF = "split of "  # followed by the name of a sweep's file: kind of a split of its dataset
+# Beginning of the kind of a file with one split of a sweep's dataset. The name of the sweep's file
+# follows.
+SPLIT_OF = "split of "
 _KINDS = {
     RESULTS: "runs, bench or stability",
     SWEEP: "a sweep",
@@ -41,26 +43,28 @@ _KINDS = {
 }
 _LENGTH, _DIGEST = 8, hashlib.sha256().digest_size
 _TAIL = _LENGTH + _DIGEST + len(MAGIC)
-_LONGEST_JSON = 1 << 24  # bytes; a table of 60 columns has 2,000
+_LONGEST_JSON = 1 << 24  # bytes; the JSON of a table of 60 columns has 2,000
 _BLOCK = 1 << 20  # bytes that are read at once
-_HEAD = 1 << 24  # bytes at the beginning in which the attributes of a file are looked for
+_HEAD = 1 << 24  # bytes at the beginning of a file in which its attributes are searched for
 _HDF5 = b"\x89HDF\r\n\x1a\n"
-_END_OF_HDF5 = slice(40, 48)  # of its first bytes, in the superblock that h5py writes by default
-_UNFINISHED_NAME = re.compile(r"\..*\.[0-9]+\.tmp")  # of a file that `replacing` has begun
+# Bytes of a file that have the length of the HDF5 content, in the superblock that h5py writes by
+# default.
+_END_OF_HDF5 = slice(40, 48)
+_UNFINISHED_NAME = re.compile(r"\..*\.[0-9]+\.tmp")  # temporary name that `replacing` gives a file
 
-# By group, by name of a computed column: offset and length of its rows in bytes.
+# Offset and length of each computed column in bytes, by group, then by name of the column.
 Regions = Mapping[str, Mapping[str, tuple[int, int]]]
 
 
 class Trailer(NamedTuple):
-    """The content of a trailer, as described above.
+    """The content of a trailer that was checked.
 
     Attributes
     ----------
-    kind : of the file.
-    groups : locations of the rows.
-    inode : of the file that was checked.
-    digest : SHA-256.
+    kind : kind of the file.
+    groups : locations of the computed columns.
+    inode : inode of the file that was checked.
+    digest : SHA-256 of the file without its computed columns.
     """
 
     kind: str
@@ -70,7 +74,7 @@ class Trailer(NamedTuple):
 
 
 def trailer_of(file: IO[bytes], kind: str, groups: Regions) -> bytes:
-    """Return the trailer of an HDF5 file that is laid out, to be appended to it."""
+    """Return the trailer that is to be appended to an HDF5 file after its layout."""
     text = json.dumps(
         {"format_version": FORMAT_VERSION, "kind": kind, "groups": groups}, separators=(",", ":")
     )
@@ -88,7 +92,7 @@ def digest_of(trailer: bytes) -> bytes:
 
 
 def is_of_this_program(path: Path) -> bool:
-    """Return whether a file ends like those of this program; it may still be damaged."""
+    """Return whether a file ends like a file of this program; it may still be damaged."""
     if not path.is_file():
         return False
     with path.open("rb") as file:
@@ -99,7 +103,7 @@ def is_of_this_program(path: Path) -> bool:
 def read_trailer(path: Path) -> Trailer:
     """Read and check the trailer of a file.
 
-    All of the file but the rows is then known to be as it was written.
+    If no error is raised, the whole file except its rows is as it was written.
 
     Parameters
     ----------
@@ -123,17 +127,17 @@ def read_trailer(path: Path) -> Trailer:
 
 
 def _read_checked(path: Path, file: IO[bytes]) -> Trailer:
-    """Return the trailer of an open file after its digest was compared.
+    """Check the digest of an open file, and return its trailer.
 
     Parameters
     ----------
-    path : of the file, for the message.
-    file : open for reading.
+    path : path of the file, for the message.
+    file : the file, open for reading.
 
     Raises
     ------
     StoreError
-        If it has no trailer, has changed, or has another format.
+        If the file has no trailer, has changed, or has another format.
     """
     size = file.seek(0, 2)
     file.seek(max(size - _TAIL, 0))
@@ -182,21 +186,21 @@ def refuse_split(path: Path, kind: str) -> None:
 
 
 def may_extend(path: Path, kind: str) -> bool:
-    """Return whether a file of a kind exists that a command can extend.
+    """Return whether there is a file that a command can extend; otherwise it writes a new file.
 
-    An empty file counts as none.
+    An empty file counts as no file.
 
     Parameters
     ----------
     path : the file that the command is to write.
-    kind : of its output.
+    kind : kind of the command's output.
 
     Raises
     ------
     InputError
         If the file is of another kind.
     StoreError
-        If it is damaged, or not of this program.
+        If the file is damaged or not of this program, or `path` is a folder.
     """
     if path.is_dir():
         raise StoreError(f"{path}: is a folder; allowed: the name of a file")
@@ -217,18 +221,18 @@ def _kind_in_words(kind: str) -> str:
 
 
 def _blocks(file: IO[bytes], end: int, groups: Regions) -> Iterator[bytes]:
-    """Yield the bytes of a file that are outside the rows, in blocks.
+    """Yield the bytes of a file that are outside its computed columns, in blocks.
 
     Parameters
     ----------
-    file : open for reading.
-    end : position in bytes before which the blocks end.
-    groups : locations of the rows.
+    file : the file, open for reading.
+    end : position in bytes at which the last block ends.
+    groups : locations of the computed columns.
 
     Raises
     ------
     ValueError, TypeError, AttributeError
-        If `groups` are no regions that follow one another.
+        If `groups` has other content than locations, or they overlap or exceed `end`.
     """
     regions = []
     for columns in groups.values():
@@ -249,13 +253,13 @@ def _blocks(file: IO[bytes], end: int, groups: Regions) -> Iterator[bytes]:
 
 
 def _reason_without_trailer(path: Path, file: IO[bytes], size: int) -> str:
-    """Describe a file that does not end with a trailer.
+    """Return in words why a file does not end with a trailer.
 
     Parameters
     ----------
-    path : its path; a name like that of an unfinished layout is recognized.
-    file : open for reading.
-    size : in bytes.
+    path : path of the file. The temporary name of an unfinished layout is recognized.
+    file : the file, open for reading.
+    size : size of the file in bytes.
     """
     file.seek(0)
     head = file.read(_HEAD)
