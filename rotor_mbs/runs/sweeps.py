@@ -238,7 +238,8 @@ class StoredSweep:
                 or not all(isinstance(one, str) for one in names)
             ):
                 raise StoreError(f"{place}: its attribute {name} is no list of texts; damaged")
-        self.shape = parsed(self.attributes.get("shape"), list, place)  # of a grid; axis 0 is slowest
+        # Numbers of values along the axes of a grid, the slowest axis first.
+        self.shape = parsed(self.attributes.get("shape"), list, place)
         self.settings = parsed(self.attributes.get("settings"), dict, place)
         columns = sorted({*COLUMNS_OF_A_RUN} - {*table.computed})
         if columns:

@@ -1,10 +1,10 @@
 """Read files with the HDF5 library in a worker process with limits of time and memory.
 
-A digest is no signature: a forged file can have a right one. The library follows the trees, heaps
-and headers of a file as they are. Some forged files end the process that reads them, and others are
-read without end, or fill the memory. A worker process therefore reads each file and returns plain
-values: a forged file ends only the worker. Files that this process wrote, and those that came with
-the program, are read without it.
+A digest is no signature: a forged file can have a right digest. The library follows the trees,
+heaps and headers of a file without checking them. Some forged files end the process that reads
+them; others are read without end, or fill the memory. Therefore a worker process reads each file
+and returns plain values: a forged file ends only the worker. Files that this process wrote, and
+shipped files, are read in this process.
 """
 
 from __future__ import annotations
@@ -26,24 +26,24 @@ from rotor_mbs.runs.trailer import read_trailer
 T = TypeVar("T")
 R = TypeVar("R")
 
-# Limits of processor time (s), which does not depend on how busy the machine is, and of address
-# space (bytes): for every file, and in addition for each byte outside its rows. It takes about 1 us
-# to read a byte.
+# Limits for reading a file: processor time in s and address space in bytes. Each limit is a value
+# for every file, and an addition for each byte outside the rows; reading a byte takes about 1 us.
+# Processor time is limited because, unlike elapsed time, it hardly depends on the machine's load.
 TIME_S = 10.0
 TIME_OF_BYTE_S = 1e-5
 MEMORY = 1 << 30
 MEMORY_OF_BYTE = 16
-# Elapsed time that is allowed in addition, for waiting. It limits the reading where the system
-# cannot limit processor time.
+# The limit of elapsed time is longer than that of processor time by these s, as the worker may have
+# to wait. It is the only limit of time if the system cannot limit processor time.
 _WAIT_S = 300.0
-_SET_UP_S = 60.0  # for the start of the worker
-_TRIES = 2  # to read a file, if the worker is killed from outside
+_SET_UP_S = 60.0  # time limit for the start of the worker in s
+_TRIES = 2  # number of attempts to read a file if the worker is killed from outside
 _KILLED = -9  # exit code of a process that SIGKILL ended
 
 
 def _load() -> None:
     """Load the code that reads files."""
-    import_module("rotor_mbs.runs.hdf5")  # by its name: it imports this module
+    import_module("rotor_mbs.runs.hdf5")  # by its name, as runs.hdf5 imports this module
 
 
 _worker = Worker(_load, memory_limit=MEMORY, is_silent=True, set_up_limit_s=_SET_UP_S)
@@ -52,36 +52,40 @@ atexit.register(_worker.close)
 
 
 def prepare_reading() -> None:
-    """Start the worker process, which loads its code while this one goes on."""
-    with suppress(ResourceError):  # reported when a file is read
+    """Start the worker process, which loads its code while this process continues."""
+    with suppress(ResourceError):  # a failure is reported when a file is read
         _worker.start()
 
 
 def trust(digest: bytes) -> None:
-    """Trust the file whose trailer has this digest, as this process writes it."""
+    """Note that this process writes the file whose trailer has this digest: it is trusted."""
     _trusted.add(digest)
 
 
 def read_in_worker(path: Path, read: Callable[[Path, T], R], argument: T) -> R:
-    """Return `read(path, argument)` of a file of this program, called in the worker process.
+    """Call `read(path, argument)` in the worker process, and return its result.
 
-    In a worker process, and for a file that is trusted, it is called in this process.
+    If the file is trusted or shipped, or this process is a worker itself, `read` is called in this
+    process, without limits.
 
     Parameters
     ----------
-    path : the file; the limits of time and memory grow with its size without the rows.
+    path : a file of this program. The limits of time and memory grow with the size of its content
+        outside the rows.
     read : a function of a path and an argument.
-    argument : its second argument.
+    argument : the second argument of `read`.
 
     Raises
     ------
     StoreError
-        If the file cannot be read within the limits, and what `read` raises.
+        If the file cannot be read within the limits.
     ResourceError
         If the worker process cannot be started or is killed again and again, or the system lacks
         memory to read the file.
+    Exception
+        What `read` raises.
     """
-    from rotor_mbs.scenario.catalogue import REFERENCES  # late: the worker does without
+    from rotor_mbs.scenario.catalogue import REFERENCES  # late: the worker does not need it
 
     trailer = read_trailer(path)
     if is_worker() or trailer.digest in _trusted or path.parent == REFERENCES:
@@ -91,7 +95,7 @@ def read_in_worker(path: Path, read: Callable[[Path, T], R], argument: T) -> R:
         size -= sum(length for _, length in columns.values())
     seconds = TIME_S + TIME_OF_BYTE_S * size
     memory = int(MEMORY + MEMORY_OF_BYTE * size)
-    is_over_limit = True  # unless the worker returns
+    is_over_limit = True  # this stays so if the worker ends without an answer
     for _ in range(_TRIES):
         try:
             value, is_over_limit = _worker.run(
@@ -99,18 +103,18 @@ def read_in_worker(path: Path, read: Callable[[Path, T], R], argument: T) -> R:
             )
             if not is_over_limit:
                 return cast(R, value)
-        except MemoryError:  # of this process, which receives what was read
+        except MemoryError:  # in this process, while it receives what the worker has read
             is_over_limit = False
         except TaskLostError as exc:
-            # At its limits the worker ends otherwise: it was killed by a user, or by a system that
-            # lacked memory.
+            # The worker's own limits do not end it with this code: a user has killed it, or a
+            # system that lacked memory.
             if exc.exit_code == _KILLED:
                 continue
         break
     else:
         raise ResourceError(f"{path}: the process that reads it was killed {_TRIES} times")
-    # If the memory of this process is limited to less, so is the worker's, and its end says nothing
-    # of the file.
+    # If this process may use less memory than the limit, so may the worker. The end of the worker
+    # then tells nothing about the file.
     if not is_over_limit or address_space() < memory:
         raise ResourceError(f"{path}: not enough memory to read it{memory_limit_text()}")
     limits = f"{seconds:.3g} s or {memory / 2**30:.3g} GB"
@@ -121,7 +125,7 @@ def read_in_worker(path: Path, read: Callable[[Path, T], R], argument: T) -> R:
 def _read_limited(
     arguments: tuple[float, int, Callable[[Path, T], R], Path, T],
 ) -> tuple[R | None, bool]:
-    """Call `read(path, argument)` within limits of this process.
+    """Limit this worker process, then call `read(path, argument)`.
 
     Parameters
     ----------
@@ -129,7 +133,7 @@ def _read_limited(
 
     Returns
     -------
-    value : what was read; None if the memory did not suffice.
+    value : the result of `read`; None if the memory did not suffice.
     is_over_limit : whether the memory did not suffice.
     """
     seconds, memory, read, path, argument = arguments

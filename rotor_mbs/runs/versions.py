@@ -1,4 +1,4 @@
-"""Describe what results depend on besides scene and method: versions, machine, code."""
+"""Return what results depend on besides scene and method: versions, machine, code."""
 
 from __future__ import annotations
 
@@ -16,9 +16,10 @@ from rotor_mbs.methods.catalogue import methods
 from rotor_mbs.processes import cores
 
 _LIBRARIES = ("numpy", "h5py")
-# folders of the package that decide a run's numbers
+# Folders of the package whose code decides the numbers of a run.
 NUMERICS = ("scenario", "solution", "methods", "models")
-# Docstrings, and comments outside of strings.
+# Pattern of source text without effect: docstrings and comments. Group 1 matches other strings,
+# which are kept: a # in a string begins no comment.
 _WITHOUT_EFFECT = re.compile(
     r'^[ \t]*[rR]?"""(?:[^\\]|\\.)*?"""[ \t]*$'
     r'|("""(?:[^\\]|\\.)*?"""|"(?:[^"\\\n]|\\.)*"|\'(?:[^\'\\\n]|\\.)*\')'
@@ -39,7 +40,8 @@ def versions() -> dict[str, str]:
 def versions_with(*distributions: str) -> dict[str, str]:
     """Return the versions of this package, of Python, of common libraries and of `distributions`.
 
-    The common libraries are those that every method uses.
+    The common libraries are those that every run uses. A library that is missing has the version
+    "not installed".
     """
     known = {"rotor_mbs": rotor_mbs.__version__, "python": platform.python_version()}
     for name in dict.fromkeys((*distributions, *_LIBRARIES)):
@@ -51,9 +53,10 @@ def versions_with(*distributions: str) -> dict[str, str]:
 
 
 def row_versions(method: Method) -> dict[str, str]:
-    """Return what computes a run by this method: versions and digests of the code.
+    """Return the versions that a row stores for a run by a method, with digests of the code.
 
-    The digests are those of this package's numerics, and of a plug-in's own code.
+    There is a digest of this package's numerics and, for a method of another package or file, one
+    of its own code.
     """
     own = {"plug-in": code_digest(tuple(method.sources))} if method.sources else {}
     return {**versions_with(*method.distributions), "code": numerics_digest(), **own}
@@ -61,7 +64,7 @@ def row_versions(method: Method) -> dict[str, str]:
 
 @functools.cache
 def machine() -> dict[str, str]:
-    """Return the operating system, and the processor with the cores this process may use."""
+    """Return the operating system, and the processor with the number of cores of this process."""
     processor, information = platform.processor() or platform.machine(), Path("/proc/cpuinfo")
     if information.is_file():
         named = re.search(
@@ -75,7 +78,7 @@ def machine() -> dict[str, str]:
     }
 
 
-# Attributes of a file that say what made it, in the order in which they are shown.
+# Attributes of a file that name the programs and the machine that made it, in the order of display.
 _MADE_WITH = (
     "rotor_mbs",
     "python",
@@ -91,7 +94,7 @@ _MADE_WITH = (
 
 
 def made_with(attributes: Mapping[str, object]) -> list[tuple[str, str]]:
-    """Return (what, version) of the programs and the machine that made a file, and the time."""
+    """Return pairs (name, text) for the programs and the machine that made a file, and its date."""
     made = [(name, str(attributes[name])) for name in _MADE_WITH if attributes.get(name)]
     created = str(attributes.get("created", ""))
     if created:

@@ -1,8 +1,9 @@
-"""The main job: every scene of the paper by the default methods and with each erratum alone.
+"""Compute every scene of the paper by the default methods, and with each erratum alone.
 
-Error and run time of all methods on one scene are measured too, at a few settings each, in seconds.
-A bench takes one process on one core and rounds over all points; here each curve is a task beside
-the runs, and a point is run once. Its errors are those of a bench; its times are only approximate.
+The study also measures error and run time of all methods on one scene, as curves over a few
+settings, within seconds. A bench runs its points one after the other in one process on one core,
+and repeats them in rounds. Here each curve is a task beside the runs, and each point is run once.
+The errors are those of a bench; the times are only approximate.
 """
 
 from __future__ import annotations
@@ -37,36 +38,38 @@ from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.studies.bench import Curve, curve_of, curve_tables, curve_tasks
 from rotor_mbs.studies.run import missing_runs, requested_runs
 
-# The scene whose error and run time are measured by all methods: the paper's own crest, and a
-# horizon of 6 s.
+# Scene on which the error and run time of all methods are measured. The paper prints the crest of
+# its rotor angle, and its horizon is 6 s.
 BENCHED = "paper/fig11"
-# a run longer than this is the last of its curve: the next one takes up to eight times as long
+# Time in s: a run that takes longer is the last of its curve, as the next run may take eight times
+# as long.
 _LONGEST_S = 0.25
 
 
 def reproduce(
     output: Path, *, workers: Workers, timeout_s: float, on_progress: OnProgress = ignore_progress
 ) -> tuple[list[RunOutcome], list[Refusal]]:
-    """Compute the default set of runs and the curves into a results file; what it has is kept.
+    """Compute the default set of runs and the curves into a results file; stored rows are kept.
 
     Parameters
     ----------
     output : the results file.
-    workers : parallel processes, or a pool that is open.
+    workers : number of parallel processes, or a pool that is open.
     timeout_s : time limit of a run in s.
-    on_progress : called after each run.
+    on_progress : called after each run and each curve.
 
     Returns
     -------
     list of RunOutcome
-        The runs of this call, then those that were stored.
+        The runs that this call computed or tried to compute, then the runs that were stored before.
     list of Refusal
-        Runs that were left out.
+        The runs that were left out, as their method cannot represent the scene.
 
     Raises
     ------
     InputError, StoreError
-        The same call then continues where it stopped.
+        Rows that were computed before the error stay in the file, and a repeated call computes the
+        others.
     """
     scenes, benched = find_scenes(["paper"]), find_scenes([BENCHED])[0]
     names = (*default_methods(), *errata_methods().values())
@@ -93,9 +96,9 @@ def reproduce(
 
 
 def made_from(results: Path, timeout_s: float) -> str:
-    """Return a digest of a results file and of all that it was made from.
+    """Return a digest of a results file and of everything that it was computed from.
 
-    That is the package's files, versions, scenes, references and the time limit.
+    The digest covers the package's files, the versions, scenes, references and the time limit.
 
     Parameters
     ----------
@@ -119,7 +122,11 @@ def made_from(results: Path, timeout_s: float) -> str:
 
 
 def summary_of(path: Path) -> str:
-    """Return the numbers and claims of the paper, and a line for each method, as text."""
+    """Return the summary of a results file as text.
+
+    It counts the numbers and claims of the paper that the printed equations and the corrected model
+    reproduce, and has a line for each method.
+    """
     with open_results(path) as results:
         runs = [run for scene in results.scenes.values() for run in scene.methods.values()]
         rows = finding(results.scenes, claims(results.scenes))

@@ -1,4 +1,4 @@
-"""References read from results files: shipped ones, and those computed in a study."""
+"""Read references from results files: shipped references, and those that a study has stored."""
 
 from __future__ import annotations
 
@@ -30,12 +30,13 @@ def shipped_files() -> list[Path]:
 
 
 class ShippedReference(NamedTuple):
-    """Locate the shipped reference of a scene.
+    """Hold the location of the shipped reference of a scene.
 
     Attributes
     ----------
-    path, scene : the file, and the name of the scene in it.
-    frozen_with : versions of what computed it.
+    path : the file.
+    scene : name of the scene in the file.
+    frozen_with : versions of the software that computed the reference.
     """
 
     path: Path
@@ -50,11 +51,11 @@ def shipped_reference(scene_hash: str) -> ShippedReference | None:
 
 @functools.cache
 def _shipped_by_hash(files: tuple[Path, ...]) -> dict[str, ShippedReference]:
-    """Return the references in these files, by the hash of their scene."""
+    """Return the shipped references in these files, by the hash of their scene."""
     by_hash: dict[str, ShippedReference] = {}
     for path in files:
-        # Three columns alone: to read the whole table takes ten times as long, and every process
-        # that runs a scene does it.
+        # Only three columns are read, as every process that runs a scene reads them: reading the
+        # whole table takes ten times as long.
         columns = read_arrays(path, RUNS, ("scene_hash", "scene", "versions"))
         for digest, scene, made_with in zip(*map(np.ndarray.tolist, columns.values()), strict=True):
             frozen_with = json.loads(made_with)["frozen_with"]
@@ -63,9 +64,9 @@ def _shipped_by_hash(files: tuple[Path, ...]) -> dict[str, ShippedReference]:
 
 
 def shipped_versions(scene_hash: str) -> dict[str, str] | None:
-    """Return what a row with a shipped reference has as its `versions`.
+    """Return the `versions` of a row with the shipped reference of a scene.
 
-    The reference is that of the scene with this hash. None is returned if there is none.
+    None is returned if no reference of the scene with this hash is shipped.
     """
     shipped = shipped_reference(scene_hash)
     if shipped is None:
@@ -81,12 +82,12 @@ def _digest(path: Path) -> str:
 
 
 def read_reference(place: RowLocation, scene: Scene) -> Trajectory | None:
-    """Return the reference of a scene in a results file; None if missing or empty.
+    """Return the reference of a scene in a results file; None if it is missing or has no samples.
 
     Parameters
     ----------
-    place : location of its row.
-    scene : gives the sample times and the quantities that are computed.
+    place : location of the row of the reference.
+    scene : the scene, with the sample times and the quantities that are returned.
     """
     row = place.read()
     samples = int(row["samples"][0])
@@ -97,18 +98,18 @@ def read_reference(place: RowLocation, scene: Scene) -> Trajectory | None:
 
 
 def rebuilt_reference(scene: Scene, arrays: Mapping[str, NDArray[Any]]) -> Trajectory:
-    """Return a stored reference with the other quantities that its scene requests.
+    """Return a stored reference with all quantities that its scene requests.
 
-    They are computed from its angles and rates by the closed form.
+    Quantities that are not stored are computed by the closed form from the angles and rates.
 
     Parameters
     ----------
     scene : the scene of the reference.
-    arrays : time and `REFERENCE_ARRAYS`, by name, as far as they are stored.
+    arrays : `time` and the arrays in `REFERENCE_ARRAYS` that are stored, by name.
     """
     from rotor_mbs.models.lagrange import samples
 
-    # An array that was not stored is NaN from the first sample on.
+    # A row has NaN at all samples of an array that the reference does not have.
     known = {name: values for name, values in arrays.items() if not np.isnan(values[:1]).all()}
     moving = scene.moving_coordinates
     states = np.hstack([known["angles"][:, moving], known["rates"][:, moving]])
@@ -120,13 +121,13 @@ def rebuilt_reference(scene: Scene, arrays: Mapping[str, NDArray[Any]]) -> Traje
 def frozen_solution(scene: Scene) -> Solution | None:
     """Return the shipped reference of a scene; None if there is none.
 
-    It has the settings and times of when it was computed. Its arrays are shared by all callers, and
-    read-only.
+    Its settings and run times are those of its computation. Its arrays are shared by all callers,
+    and read-only.
 
     Raises
     ------
     StoreError
-        If it cannot be read.
+        If its file cannot be read.
     """
     shipped = shipped_reference(scene_hash(scene))
     return None if shipped is None else _read_shipped(shipped, scene)
@@ -138,7 +139,8 @@ def _read_shipped(shipped: ShippedReference, scene: Scene) -> Solution:
 
     Parameters
     ----------
-    shipped, scene : location of the reference, and the scene that it is of.
+    shipped : location of the reference.
+    scene : the scene of the reference.
     """
     with open_results(shipped.path, only=[shipped.scene]) as results:
         stored = results.scenes[shipped.scene].reference
@@ -147,7 +149,7 @@ def _read_shipped(shipped: ShippedReference, scene: Scene) -> Solution:
         arrays = {
             name: stored.array(name) for name in ("time", *REFERENCE_ARRAYS) if name in stored
         }
-    # Not in the block above, which would report an error of this code as damage of the file.
+    # This is outside the block above, which would report an error of this code as a damaged file.
     trajectory = rebuilt_reference(scene, arrays)
     for values in (
         trajectory.time,
