@@ -35,8 +35,8 @@ class StoredArrays(NamedTuple):
     ----------
     arrays : arrays of numbers with up to three dimensions by name, as they are stored.
     attributes : for each array its attributes in `ARRAY_ATTRIBUTES`, by name.
-    others : all else by name: the other members of the group, and other groups with arrays. Each
-        has a description, and whether it is an array of something else than numbers.
+    others : the other members of the group, and other groups with arrays, by name. A value is a
+        description, and whether the member is an array of something else than numbers.
     """
 
     arrays: dict[str, NDArray[Any]]

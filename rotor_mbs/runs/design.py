@@ -25,8 +25,8 @@ from rotor_mbs.solution.status import STATUSES
 
 MISSING = -1  # status of a row that is not stored
 # A run has a row in /runs and a row in the table of its scene's arrays. The second row repeats the
-# columns on the left. When both are joined to one row, the repeated columns get the names on the
-# right.
+# columns that are named on the left. When both rows are joined, the repeated columns get the names
+# on the right.
 STATUS_COPIES = {"status": "status_repeated", "samples": "samples_repeated"}
 # Type of a column of computed texts. The column has the shape (run, characters): each text is
 # UTF-8 bytes, filled up with zeros.
@@ -152,7 +152,7 @@ COLUMNS["status"] = COLUMNS["status"]._replace(attributes=flags(("missing", *STA
 
 
 def columns_in(table: str) -> dict[str, Column]:
-    """Return those of COLUMNS that a table has, by name.
+    """Return the columns in COLUMNS that a table has, by name.
 
     Parameters
     ----------
@@ -165,8 +165,8 @@ def columns_in(table: str) -> dict[str, Column]:
     return columns
 
 
-# Units and long name of each known column of runs and points, in the order of the file. A value of
-# a design under another name is not stored in a column.
+# Units and long name of each known column of runs and points, in the order of the file. Values with
+# other names are not stored.
 DESIGN_COLUMNS = {
     "scene": ("1", "name of the scene"),
     "method_name": ("1", "name of the method: model/integrator"),
@@ -197,7 +197,7 @@ class RunRequest:
     ----------
     scene : the scene.
     method : name of the method.
-    settings : the settings of the method that are given.
+    settings : settings that are given for the method, by name.
     versions : versions of the software that computes the run; None for those of this installation.
         A reference that is read from a shipped file also has `frozen_with`, the versions of the
         software that computed it.

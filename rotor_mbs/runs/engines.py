@@ -15,9 +15,9 @@ from rotor_mbs.runs.versions import numerics_digest, versions, versions_with
 ENGINE_FORMS = "local, or dask:tcp://host:port"
 
 # Settings of the GNU C library with which a process keeps up to 128 MB of memory that it has freed.
-# The arrays of a task are as large as those of the task before. They then reuse this memory instead
-# of getting it from the system again, page by page, which takes an eleventh of the time of a fast
-# run with many samples.
+# The arrays of a task are as large as those of the task before, and reuse this memory. To get it
+# from the system again, page by page, takes an eleventh of the time of a fast run with many
+# samples.
 _KEEP_MEMORY = {"MALLOC_MMAP_THRESHOLD_": str(1 << 25), "MALLOC_TRIM_THRESHOLD_": str(1 << 27)}
 
 
@@ -45,7 +45,7 @@ def open_task_pool(name: str, workers: int) -> TaskPool:
 
 def _load() -> None:
     """Load the code that computes the runs of a sweep, and heyoka if it is installed."""
-    import_module("rotor_mbs.studies.sweep")  # by its name, as only the workers import it here
+    import_module("rotor_mbs.studies.sweep")  # by its name, as only the workers import it
     import_module("rotor_mbs.models.lagrange.heyoka_adapter").is_available()
 
 

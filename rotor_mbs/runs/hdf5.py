@@ -1,4 +1,4 @@
-"""Read files of this program with the HDF5 library: groups and known columns, but not the rows.
+"""Read groups of this program's files with the HDF5 library, except their computed columns.
 
 The worker process of `runs.untrusted` loads this module. The module imports little, so that the
 worker starts fast.
@@ -21,7 +21,7 @@ from rotor_mbs.errors import RotorError, StoreError, one_line
 from rotor_mbs.runs.trailer import Trailer, read_trailer, refuse_split
 from rotor_mbs.runs.untrusted import read_in_worker
 
-CHARACTERS = "characters"  # name of the dimension of computed texts over their bytes
+CHARACTERS = "characters"  # name of the dimension over the bytes of a computed text
 # Text with which the netCDF-4 library begins the name of a dimension that has no values.
 WITHOUT_VALUES = "This is a netCDF dimension but not a netCDF variable."
 # Attributes that the HDF5 and netCDF-4 libraries write for themselves.

@@ -35,7 +35,7 @@ from rotor_mbs.runs.untrusted import trust
 
 FORMAT = "rotor_mbs"
 CONVENTIONS = "CF-1.11, ACDD-1.3"
-# Attribute `keywords` of every results file, which the ACDD conventions ask for.
+# Attribute `keywords` of every file with tables, which the ACDD conventions ask for.
 KEYWORDS = "multibody dynamics, wind turbine rotor, Euler-Lagrange equations, model verification"
 _HEAD_BYTES = 1 << 17  # bytes that are reserved for descriptions and texts outside the rows
 
@@ -59,7 +59,7 @@ def create_file(
     Yields
     ------
     TableFile
-        The tables of the file, with its temporary name.
+        The tables of the file, which has its temporary name.
 
     Raises
     ------

@@ -162,7 +162,7 @@ def write_file(path: Path, content: Buffer) -> None:
 
 
 def refuse_foreign(path: Path, mark: bytes) -> None:
-    """Raise InputError if a file must not be replaced, as it is not an output of the same kind.
+    """Raise InputError if an existing file is not an output of the kind that is to replace it.
 
     This is for outputs that are no HDF5 files. An empty file may be replaced.
 

@@ -197,7 +197,7 @@ class StoredRun:
 
     @property
     def _own_arrays(self) -> dict[str, NDArray[Any]]:
-        """Return the arrays of the run by name, including the NaN after its last sample."""
+        """Return the arrays of the run by name, including the blank rows after its last sample."""
         return {
             name: values
             for name, values in self._row.items()
@@ -547,7 +547,7 @@ class StoredRuns:
 
     @functools.cached_property
     def title(self) -> str:
-        """Return `StoredScene.label` of the scene; "" for several scenes."""
+        """Return the name of the scene, with changes to the shipped one; "" for several scenes."""
         if self.group is None:
             return ""
         with open_results(self._path, only=[self.group]) as results:
@@ -681,8 +681,9 @@ class Record:
     ----------
     kind : "bench" or "stability" (the keys of `POINT_COLUMNS`), "modes" or "comparison".
     scene : name of the scene.
-    name : for a curve or a ladder, the name of the method, and settings that are constant along the
-        curve if they are not the default ones; otherwise the end of the group, as "data/modes".
+    name : name of a curve or a ladder: the method, then the settings that are constant along it
+        unless they are the defaults. For modes and comparisons it is the end of the group's path,
+        such as "data/modes".
     attributes : further values by name.
     arrays : arrays by name. Those of a curve or a ladder have the shape (points,); `status` has
         codes of `solution.status.STATUSES`.

@@ -222,7 +222,7 @@ def row_of_run(run: Solution, place: RowLocation, facts: Mapping[str, object]) -
     Parameters
     ----------
     run : the run.
-    place : location of the row; it has the columns that are filled.
+    place : location of the row, whose columns are filled.
     facts : further values by name of the column.
     """
     integration = run.integration

@@ -1,7 +1,7 @@
 """Compute rows of a table: send tasks to worker processes, and write their rows to the file.
 
-The parent process calls `run_tasks_references_first`, `run_tasks`, `pool.run_in` and
-`TaskPool.submit` for a run. The worker process then calls `run_in_worker` and `RunTask.perform`.
+For each run the parent process calls `run_tasks_references_first`, `run_tasks`, `pool.run_in` and
+`TaskPool.submit`; the worker process then calls `run_in_worker` and `RunTask.perform`.
 """
 
 from __future__ import annotations
@@ -237,9 +237,8 @@ def run_tasks_references_first(
         else:
             without_reference.append(task)
     # The slowest tasks start first: a slow task that started last would keep one process busy while
-    # the other processes are idle. The fastest tasks start in turns with them. The methods of fast
-    # tasks compile code when they start, and in turns two processes seldom compile the same code at
-    # once.
+    # the other processes are idle. The fastest tasks start in turns with the slowest, because fast
+    # methods compile code when they start: two processes then seldom compile the same code at once.
     ready.sort(key=lambda task: -task.work)
     quarter, count = len(ready) // 4, len(ready)
     ordered: list[Task] = []

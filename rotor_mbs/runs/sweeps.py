@@ -283,7 +283,7 @@ class StoredSweep:
 
     @contextmanager
     def opened_run(self, label: int) -> Iterator[StoredRun]:
-        """Yield the run with the number `label`; it replaces `StoredRuns.opened_run`."""
+        """Yield the run with the number `label`, as `StoredRuns.opened_run` does for a label."""
         with reading(self._path):
             yield self.run(int(label))
 

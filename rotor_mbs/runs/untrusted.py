@@ -33,8 +33,8 @@ TIME_S = 10.0
 TIME_OF_BYTE_S = 1e-5
 MEMORY = 1 << 30
 MEMORY_OF_BYTE = 16
-# The limit of elapsed time is longer than that of processor time by these s, as the worker may have
-# to wait. It is the only limit of time if the system cannot limit processor time.
+# Time in s by which the limit of elapsed time exceeds that of processor time, as the worker may
+# have to wait. The limit of elapsed time is the only one if the system cannot limit processor time.
 _WAIT_S = 300.0
 _SET_UP_S = 60.0  # time limit for the start of the worker in s
 _TRIES = 2  # number of attempts to read a file if the worker is killed from outside
@@ -58,7 +58,7 @@ def prepare_reading() -> None:
 
 
 def trust(digest: bytes) -> None:
-    """Note that this process writes the file whose trailer has this digest: it is trusted."""
+    """Trust the file whose trailer has this digest, because this process writes the file."""
     _trusted.add(digest)
 
 

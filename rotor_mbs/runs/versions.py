@@ -1,4 +1,4 @@
-"""Return what results depend on besides scene and method: versions, machine, code."""
+"""Return the versions, machine and code digests on which results depend."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from rotor_mbs.processes import cores
 _LIBRARIES = ("numpy", "h5py")
 # Folders of the package whose code decides the numbers of a run.
 NUMERICS = ("scenario", "solution", "methods", "models")
-# Pattern of source text without effect: docstrings and comments. Group 1 matches other strings,
-# which are kept: a # in a string begins no comment.
+# Pattern of docstrings and comments, which have no effect on a run. It also matches other strings,
+# as group 1, which are kept: a # in a string begins no comment.
 _WITHOUT_EFFECT = re.compile(
     r'^[ \t]*[rR]?"""(?:[^\\]|\\.)*?"""[ \t]*$'
     r'|("""(?:[^\\]|\\.)*?"""|"(?:[^"\\\n]|\\.)*"|\'(?:[^\'\\\n]|\\.)*\')'

@@ -47,7 +47,7 @@ from rotor_mbs.studies.stored_references import frozen_solution, read_reference,
 # is not that of a cold cache. A run that takes more than half this budget is not repeated.
 _REPEATS = 5
 _REPEAT_BUDGET_S = 0.05
-_JUDGING_S = 1.0  # s that judging a run may always take, even after the time limit of the run
+_JUDGING_S = 1.0  # time in s that judging a run may always take, even after its time limit
 _FIXED_WORK = 3.0  # work of building, judging and storing a run, in the unit of `work_of`
 
 
@@ -399,7 +399,7 @@ def next_to_try(scene: Scene, method: str, settings: Mapping[str, object], statu
 
     Parameters
     ----------
-    scene : the scene. Its interval between samples is the largest step of a ladder.
+    scene : the scene; steps of a ladder are at most the interval between its samples.
     method, settings : method and settings of the run.
     status : status of the run; there is advice only for "inaccurate".
     """

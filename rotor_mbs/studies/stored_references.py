@@ -54,8 +54,8 @@ def _shipped_by_hash(files: tuple[Path, ...]) -> dict[str, ShippedReference]:
     """Return the shipped references in these files, by the hash of their scene."""
     by_hash: dict[str, ShippedReference] = {}
     for path in files:
-        # Only three columns are read, as every process that runs a scene reads them: reading the
-        # whole table takes ten times as long.
+        # Only three columns are read: reading the whole table takes ten times as long, and every
+        # process that runs a scene calls this function.
         columns = read_arrays(path, RUNS, ("scene_hash", "scene", "versions"))
         for digest, scene, made_with in zip(*map(np.ndarray.tolist, columns.values()), strict=True):
             frozen_with = json.loads(made_with)["frozen_with"]
