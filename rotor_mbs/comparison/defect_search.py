@@ -1,7 +1,8 @@
-"""Other scenes, equations and parameters that explain the defects of data.
+"""Search for other scenes, equations and parameters that explain the defects of data.
 
-No motion is integrated from the start: each hypothesis is compared with the data's own states,
-interval by interval. It explains the defects if it leaves nearly none, or what is tolerated.
+Each hypothesis is integrated over single intervals from the data's own states, not from the start
+of the run. A hypothesis explains the defects if it leaves nearly none, or if all defects that it
+leaves are within the tolerance.
 """
 
 from __future__ import annotations
@@ -29,42 +30,48 @@ from rotor_mbs.models.lagrange.defects import FIT_ROWS, explicit_steps, quick_en
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.trajectory import Array
 
-# Shares of the largest defect that an explanation may leave, because the other program and the
-# quick steps have errors of their own. The second share holds if what is left is within the
-# tolerance.
+# An explanation may leave the share _LEFT of the largest defect, because the other program and the
+# quick steps (`quick_ends`) have errors of their own. It may leave the share _LEFT_OF_SMALL if the
+# defects that it leaves are within the tolerance.
 _LEFT, _LEFT_OF_SMALL = 1e-3, 0.15
-# The same share by the number of fitted parameters.
+# Largest share of the largest defect that fitted parameters may leave, by their number.
 _LEFT_OF_FITTED = {1: 0.02, 2: 2e-3, 3: 2e-3}
-_ALIKE = 3.0  # times what the best explanation leaves
+# An explanation counts as good as the best one if it leaves at most _ALIKE times as much. For
+# defects within rounding, the factor is _ALIKE_IN_ROUNDING.
+_ALIKE = 3.0
 _ALIKE_IN_ROUNDING = 1.05
-_QUICK = 3e-5  # relative error of the effect of another model, if computed by quick steps
-# Fine steps are _MOST_FINE times as many, so that this error holds also where the mass matrix is
-# nearly singular. A search that has to be quick takes at most _FINE_STEPS of them in an interval.
+_QUICK = 3e-5  # relative error of the effect of another model that is computed by quick steps
+# Fine steps are up to _MOST_FINE times as many as coarse steps, so that the error _QUICK also holds
+# if the mass matrix is nearly singular. A search with a lower limit on the number of steps takes at
+# most _FINE_STEPS fine steps in an interval.
 _MOST_FINE, _FINE_STEPS = 8, 32
-# A model that leaves a larger share of the defects by coarse steps is not tried by fine ones.
+# A model is tried by fine steps only if it leaves at most this share of the defects by coarse ones.
 _PERHAPS = 0.2
 # A multiple of a model's effect explains far more if it leaves less than this share of what the
 # model leaves.
 _OF_RESCALED = 0.3
-_LEFT_OF_SETS = 0.1  # share left by the projections on several parameters, before they are fitted
-_FAR_BETTER = 0.1  # times what a cheaper explanation leaves
-_SIGNIFICANT = 8.0  # standard deviations of an estimate
-# A textbook mistake is certainly the cause if all others leave more than this many times as much.
+# A set of several parameters is fitted only if the linear estimate of the fit leaves less than this
+# share of the defects.
+_LEFT_OF_SETS = 0.1
+_FAR_BETTER = 0.1  # a far better explanation leaves less than this share of what a cheaper one does
+_SIGNIFICANT = 8.0  # smallest significant change of a parameter, in standard deviations
+# A textbook mistake is certainly the cause if all other hypotheses leave more than this many times
+# as much.
 _CERTAIN = 10.0
-_MAX_CHANGE = 0.6  # a share, or rad: what is further off is another scene
-_MAX_FITTED = 8  # sets of parameters, those whose projections leave least
-_MAX_PARAMETERS = 3  # at once
-_MAX_INTERVALS = 120  # on which a hypothesis is tried
-_MAX_WINDOWS = 60  # of rows, likewise, where the rates are computed from the angles
-_SMALLEST_FLOOR = 1e-18  # rad
-# Largest number of steps of Runge and Kutta in an interval: for any search; for one that takes some
-# seconds; for data that agree.
+_MAX_CHANGE = 0.6  # largest change of a parameter, share or rad: a larger one is another scene
+_MAX_FITTED = 8  # number of sets of each size that are fitted: the best by the linear estimate
+_MAX_PARAMETERS = 3  # largest number of parameters in a set
+_MAX_INTERVALS = 120  # largest number of intervals on which a hypothesis is tried
+_MAX_WINDOWS = 60  # the same for windows of rows, which are used if rates are fitted to the angles
+_SMALLEST_FLOOR = 1e-18  # rad, added to the rounding of a window so that it is not zero
+# Largest number of Runge-Kutta steps in an interval: for a search of any length, for a search of
+# some seconds, and for a search in data that agree.
 _MAX_STEPS, QUICK_SEARCH, BRIEF_SEARCH = 512, 32, 8
-_MAX_FITTED_BRIEF = 4
-_DIFFERENCE = 1e-4  # share or rad, for the derivative by a parameter
-_ROUNDS = 8  # of Gauss and Newton's iteration
-_INDEPENDENT = 1e-6  # determinant of the cosines between the signatures of a set
-_MAX_NAMED = 6  # explanations
+_MAX_FITTED_BRIEF = 4  # the value of _MAX_FITTED for a search in data that agree
+_DIFFERENCE = 1e-4  # change of a parameter, share or rad, for the difference quotient
+_ROUNDS = 8  # largest number of Gauss-Newton iterations
+_INDEPENDENT = 1e-6  # smallest determinant of the cosines between independent signatures
+_MAX_NAMED = 6  # largest number of explanations that a search returns
 
 
 class DefectSearch:
@@ -73,8 +80,9 @@ class DefectSearch:
     Parameters
     ----------
     judged : the defects of the data.
-    max_steps : of Runge and Kutta in an interval: where more are needed, nothing is searched for.
-        With at most `BRIEF_SEARCH`, sets of several parameters are not tried.
+    max_steps : largest number of Runge-Kutta steps in an interval. If the motion needs more, every
+        search returns an empty list. With at most `BRIEF_SEARCH` steps, sets of several parameters
+        are not tried.
 
     Attributes
     ----------
@@ -97,8 +105,8 @@ class DefectSearch:
         self._allowed = max(_LEFT * largest, min(judged.tolerance, _LEFT_OF_SMALL * largest))
         self._begins, self._ends = defects.time[rows], defects.time[rows + 1]
         self._states = defects.states[rows].T
-        # Residuals are weighted by the rounding of each number, which has a lower limit so that no
-        # channel counts alone.
+        # Residuals are divided by the rounding of each number. The rounding has a lower limit, so
+        # that no channel dominates all others.
         self._weights = 1.0 / np.maximum(self._floors, 1e-4 * largest)
         self._is_brief = max_steps <= BRIEF_SEARCH
         self._steps, self._fine = None, _MOST_FINE
@@ -107,8 +115,8 @@ class DefectSearch:
             self._steps = explicit_steps(scene, lengths, defects.states[rows], max_steps)
         if self._steps is not None and max_steps < _MAX_STEPS:
             self._fine = max(min(_MOST_FINE, _FINE_STEPS // self._steps), 1)
-        self._ends_of_scene: dict[int, Array] = {}  # by the factor of the steps
-        # The number of rows, on average, over which a coordinate keeps one value, and with it one
+        self._ends_of_scene: dict[int, Array] = {}  # by the factor `steps` of `_residual`
+        # Mean number of rows in which a coordinate keeps the same value, and with it the same
         # rounding error.
         changes = np.count_nonzero(np.diff(self._states), axis=1)
         of_coordinates = (len(rows) / (1.0 + changes)).reshape(2, -1).max(axis=0)
@@ -122,13 +130,14 @@ class DefectSearch:
     def explanations(self) -> list[str]:
         """Search for other scenes and equations, and for parameters that are off.
 
-        Parameters are tried if nothing else explains the defects to the error of the quick steps.
+        Parameters are tried only if no other scene or equations explain the defects to within the
+        error of the quick steps.
 
         Returns
         -------
         list of str
-            The best explanation and all that are alike, in words. Empty where nothing that was
-            tried explains the defects, or the motion is too stiff for explicit steps between rows.
+            The best explanation, and at most `_MAX_NAMED` - 1 that are as good, in words. Empty if
+            no hypothesis explains the defects, or the motion is too stiff for explicit steps.
         """
         if self._steps is None:
             return []
@@ -138,26 +147,27 @@ class DefectSearch:
             for explanation in explanations(self._plausible_models(), self._left_by):
                 if not self._has_other_size(explanation):
                     explained.append(explanation)
-        # A named mistake is preferred to fitted parameters, unless these explain far more.
+        # A named mistake is preferred to fitted parameters, unless the parameters explain far more.
         least = _least(explained)
         if least > 10.0 * _QUICK:
             by_parameters = self._parameter_sets()
             if _least(by_parameters) < _FAR_BETTER * least:
                 explained = by_parameters
-        # Defects within rounding leave about as much whatever the cause: only explanations that are
-        # nearly as good as the best are alike there.
+        # If the defects are within rounding, every hypothesis leaves about as much. Only those that
+        # are nearly as good as the best one are then named.
         factor = _ALIKE_IN_ROUNDING if is_rounding else _ALIKE
         alike = closest(explained, factor, _QUICK)
         return [explanation.text for explanation in alike[:_MAX_NAMED]]
 
     def textbook_causes(self) -> list[str]:
-        """Find the mistakes in equations, else in numbers, that explain the defects.
+        """Find the textbook mistakes that explain the defects; if there are none, fit parameters.
 
         Returns
         -------
         list of str
-            The best, which leaves at most a thousandth of the defects' weighted root mean square,
-            and all that leave at most ten times as much; a single one is certainly the cause.
+            The best explanation, and all that leave at most ten times as much, in words. A single
+            explanation is certainly the cause. The list is empty if the best explanation leaves
+            more than a thousandth of the defects' weighted root mean square.
         """
         if self._steps is None or self._is_rounding:
             return []
@@ -166,20 +176,20 @@ class DefectSearch:
             return self._share(self._residual(model, self._fine))
 
         # An explanation leaves at most _LEFT. Hypotheses that leave up to _CERTAIN times as much
-        # are kept, too: if there are any, the explanation is not certainly the cause.
+        # are kept, too: one such hypothesis makes the explanation uncertain.
         hypotheses = rotor_hypotheses(self._scene)
         explained = list(explanations(hypotheses, left, _CERTAIN * _LEFT))
         if not _least(explained) <= _LEFT:
             explained = self._parameter_sets()
         if not _least(explained) <= _LEFT:
             return []
-        # A right model leaves an error of the quick steps. What is left below this error does not
-        # show which model is better.
+        # The right model leaves the error of the quick steps. If two models leave less than this
+        # error, it is not known which of them is better.
         alike = closest(explained, _CERTAIN, 0.1 * _QUICK)
         return [explanation.text for explanation in alike]
 
     def scenes(self) -> list[str]:
-        """Search for scenes of the catalogue that start as the data do and explain the defects."""
+        """Search for scenes of the catalogue that have the data's start and explain the defects."""
         if self._steps is None:
             return []
 
@@ -191,7 +201,7 @@ class DefectSearch:
         return [explanation.text for explanation in explanations(hypotheses, left, allowed)]
 
     def _plausible_models(self) -> Iterator[Hypothesis[RotorModel]]:
-        """Yield the models that leave little of the defects when computed by coarse steps."""
+        """Yield the models that leave a share of at most `_PERHAPS`, computed by coarse steps."""
         first_row = self._first_row()
         every = itertools.chain(
             rotor_hypotheses(self._scene),
@@ -203,9 +213,9 @@ class DefectSearch:
                 yield hypothesis
 
     def _first_row(self) -> Array:
-        """Return the first state of the data, with the scene's pitches where they have no inertia.
+        """Return the first state of the data: angles, then rates, (2 (1 + blades),).
 
-        Its shape is (2 (1 + blades),).
+        A coordinate without inertia has its initial state in the scene.
         """
         scene = self._scene
         first = np.array([*scene.initial_angles, *scene.initial_rates])
@@ -217,17 +227,18 @@ class DefectSearch:
     # Residuals
 
     def _residual(self, model: RotorModel, steps: int = 1) -> Array:
-        """Return the defects of the data by another model.
+        """Return the defects of the data that are left if a model takes the place of the scene.
 
         Parameters
         ----------
-        model : in place of the scene.
-        steps : factor of the number of steps in an interval.
+        model : the scene, equations or method that is tried.
+        steps : factor by which the number of steps in an interval is multiplied.
 
         Returns
         -------
         ndarray
-            (k, m) rad; infinite if the model has other coordinates or its equations do not hold.
+            (k, m) rad; for fitted rates the residuals of windows, see `_window_residuals`. Infinite
+            if other coordinates of the model move, or its equations do not hold for its scene.
         """
         if model.scene.moving_coordinates != self._moving:
             return np.full_like(self._values, np.inf)
@@ -239,12 +250,13 @@ class DefectSearch:
                     model.scene, *intervals, steps * self._steps, model.accelerations()
                 )
             else:
-                # `change` below is then the error of the method against the closed form. The steps
-                # of the two differ, so that errors of the closed form's steps remain in it.
+                # `change` below is then the error of the model's method. It includes the error of
+                # the closed form's steps, which does not cancel because the steps are different.
                 ends = quick_ends(model.scene, *intervals, model.steps, step=model.method)
         except RotorError:
             return np.full_like(self._values, np.inf)
-        # Two models are integrated by the same steps, whose errors cancel in the difference.
+        # A model without its own method is integrated by the same steps as the scene: the errors
+        # of the steps cancel in the difference.
         if steps not in self._ends_of_scene:
             self._ends_of_scene[steps] = quick_ends(self._scene, *intervals, steps * self._steps)
         change = (ends - self._ends_of_scene[steps]).T
@@ -254,16 +266,16 @@ class DefectSearch:
         return np.asarray(self._values + np.einsum("kij,kj->ki", self._from_intervals, of_windows))
 
     def _largest_left(self, residual: Array) -> float:
-        """Return the largest of (k, m) defects beyond rounding, rad."""
+        """Return the largest defect beyond rounding in a residual of shape (k, m), rad."""
         return float((np.abs(residual) - AT_FLOOR * self._floors).max())
 
     def _share(self, residual: Array) -> float:
-        """Return the share of the defects' weighted root mean square that is left."""
+        """Return the weighted root mean square of a residual, as a share of that of the defects."""
         before = float(np.linalg.norm(self._values * self._weights))
         return float(np.linalg.norm(residual * self._weights)) / (before or 1.0)
 
     def _left_by(self, model: RotorModel) -> float:
-        """Return the share of the defects that a model leaves; infinite where it is too much."""
+        """Return the share of the defects that a model leaves; infinite if it leaves too much."""
         return self._left_at_most(model, self._allowed)
 
     def _left_at_most(self, model: RotorModel, allowed: float) -> float:
@@ -277,11 +289,11 @@ class DefectSearch:
         return self._share(residual)
 
     def _has_other_size(self, explanation: Explanation[RotorModel]) -> bool:
-        """Return whether a multiple of a model's effect explains the defects far better than it.
+        """Return whether a multiple of a model's effect explains the defects far better.
 
-        Then the data have a mistake of this kind but of another size: a hub whose inertia is too
-        small is not one without inertia. If the model is right and the rest is the other program's
-        own error, no multiple is far better.
+        If so, the data have a mistake of the model's kind but of another size, such as a hub whose
+        inertia is too small in place of a hub without inertia. If the model is right and the rest
+        is the other program's own error, no multiple is far better.
         """
         if explanation.left <= 10.0 * _QUICK:
             return False
@@ -297,14 +309,15 @@ class DefectSearch:
     def _parameter_sets(self) -> list[Explanation[RotorModel]]:
         """Search for small sets of parameters that explain the defects.
 
-        The signature of a parameter is the derivative of the defects by it. Least squares over the
-        signatures of a set say how much of the defects it may explain; the best sets are fitted.
+        The signature of a parameter is the derivative of the defects with respect to the parameter,
+        as a unit vector. A linear estimate, by least squares over the signatures of a set, says how
+        much of the defects the set may explain. The best sets by this estimate are fitted.
 
         Returns
         -------
         list of Explanation
-            Sets of the smallest number of parameters that explains the defects, or of a larger one
-            that explains them far better; empty if none does.
+            Sets with the smallest number of parameters that explains the defects, or with a larger
+            number if it explains them far better. Empty if no set explains them.
         """
         candidates, signatures = self._signatures()
         if not candidates:
@@ -320,16 +333,16 @@ class DefectSearch:
             if not len(sets):
                 break
             matrices = cosines[sets[:, :, None], sets[:, None, :]]
-            # Parameters with the same signature cannot be distinguished: a mass and gravity may
-            # have the same.
+            # Parameters with the same signature cannot be distinguished. A mass and gravity, for
+            # example, may have the same signature.
             is_independent = np.linalg.det(matrices) > _INDEPENDENT
             sets, matrices = sets[is_independent], matrices[is_independent]
             sides = projections[sets]
             amounts = np.linalg.solve(matrices, sides[..., None])[..., 0]
-            # The part of `total` that a set explains.
+            # Each set explains the part `squares` of `total`.
             squares = (sides * amounts).sum(axis=1)
-            # Signatures are those of small changes. A single parameter may be far off, where its
-            # signature is another: it is fitted even if this one explains little.
+            # Signatures hold for small changes only. A single parameter may be far off, with
+            # another signature there: it is fitted even if its signature here explains little.
             if count > 1:
                 is_enough = squares > (1.0 - _LEFT_OF_SETS**2) * total
                 sets, squares = sets[is_enough], squares[is_enough]
@@ -338,12 +351,12 @@ class DefectSearch:
                 hypothesis = self._fit([candidates[i] for i in places])
                 if hypothesis is not None:
                     fitted.append(hypothesis)
-            # Fitted numbers explain a part of any defects, and several of them a large part: they
-            # are allowed to leave less than a textbook mistake, whose size is known.
+            # Fitted parameters explain a part of any defects, and several parameters a large part.
+            # They may therefore leave less than a textbook mistake, whose size is not fitted.
             allowed = min(self._allowed, _LEFT_OF_FITTED[count] * self._largest)
             left = functools.partial(self._left_at_most, allowed=allowed)
             explained = list(explanations(fitted, left))
-            # A further parameter is accepted only if it explains far more.
+            # Sets with one more parameter are accepted only if they explain far more.
             if best and _least(explained) > _FAR_BETTER * _least(best):
                 break
             if explained:
@@ -354,7 +367,7 @@ class DefectSearch:
 
     def _signatures(self) -> tuple[list[Parameter], Array]:
         """Return the parameters that have an effect, and their signatures as unit vectors."""
-        # With unit vectors, scalar products are the cosines between signatures.
+        # Scalar products of unit vectors are the cosines between signatures.
         candidates, signatures = [], []
         for parameter in parameters(self._scene):
             slope = self._slope([parameter], [0.0], 0).ravel()
@@ -365,17 +378,17 @@ class DefectSearch:
         return candidates, np.array(signatures)
 
     def _fit(self, chosen: Sequence[Parameter]) -> Hypothesis[RotorModel] | None:
-        """Fit some parameters at once to the defects, by Gauss and Newton's iteration.
+        """Fit a set of parameters to the defects by Gauss-Newton iteration.
 
         Parameters
         ----------
-        chosen : the parameters.
+        chosen : the parameters of the set.
 
         Returns
         -------
         Hypothesis or None
             The changes with their uncertainties, in words, and the changed model; None if the fit
-            is not finite, a change is more than `_MAX_CHANGE`, or one is not significant.
+            is not finite, a change is more than `_MAX_CHANGE`, or a change is not significant.
         """
         change = np.zeros(len(chosen))
         for _ in range(1 if self._is_rounding else _ROUNDS):
@@ -396,7 +409,7 @@ class DefectSearch:
         if not np.isfinite(weighted).all():
             return None
         deviation = self._deviations(weighted, slopes)
-        # A change that is not larger than the error of the quick steps is not significant either.
+        # The uncertainty of a change is at least the relative error of the quick steps.
         deviation = np.maximum(deviation, _QUICK * np.abs(change))
         if (np.abs(change) < _SIGNIFICANT * deviation).any():
             return None
@@ -414,29 +427,30 @@ class DefectSearch:
         Parameters
         ----------
         weighted : (k, m) weighted residuals of the fit.
-        slopes : (k m, parameters) their derivatives by the changes.
+        slopes : (k m, parameters) derivatives of these residuals with respect to the changes.
         """
         spread = float(np.sqrt((weighted**2).mean()))
         if self._is_rounding:
-            # A rounding error that is repeated over many rows counts once.
+            # A rounding error that repeats over many rows is one error, not many independent ones.
             sizes = (slopes**2).reshape(self._values.shape).sum(axis=0)
             spread = max(spread, 0.3) * math.sqrt(float(sizes @ self._repeats / sizes.sum()))
         covariance = np.linalg.pinv(slopes.T @ slopes)
         return np.asarray(spread * np.sqrt(np.diag(covariance)))
 
     def _slope(self, chosen: Sequence[Parameter], at: Sequence[float] | Array, which: int) -> Array:
-        """Return the weighted derivative of the defects by a parameter, per share or rad.
+        """Return the weighted derivative of the defects with respect to a parameter.
 
         Parameters
         ----------
         chosen : parameters that are changed.
-        at : (parameters,) their changes, at which the derivative is taken.
-        which : number of the parameter by which the derivative is taken.
+        at : (parameters,) changes of `chosen` at which the derivative is taken, shares or rad.
+        which : place in `chosen` of the parameter of the derivative.
 
         Returns
         -------
         ndarray
-            (k, m), not finite if the changed model has other coordinates.
+            (k, m), per unit of the parameter's change; not finite if other coordinates of the
+            changed model move.
         """
         residuals = []
         # Central differences: their error is of second order in the step.
@@ -450,9 +464,10 @@ class DefectSearch:
 
 
 def _tried_intervals(judged: JudgedDefects) -> NDArray[np.int64]:
-    """Choose intervals: some evenly over the run, and those of the largest defects.
+    """Choose the intervals on which hypotheses are tried.
 
-    Intervals with a kink of a load inside are left out: there the quick steps are wrong.
+    One half is spread evenly over the run, the other half has the largest defects. Intervals with a
+    kink of a load inside are left out, because quick steps are inaccurate there.
 
     Parameters
     ----------
@@ -474,7 +489,7 @@ def _tried_intervals(judged: JudgedDefects) -> NDArray[np.int64]:
 
 
 def _has_kink(judged: JudgedDefects) -> NDArray[np.bool_]:
-    """Return whether each interval has a kink of a load inside, where quick steps fail."""
+    """Return for each interval, (n - 1,), whether a load has a kink inside it."""
     time = judged.defects.time
     has_kink = np.zeros(len(time) - 1, dtype=bool)
     for kink in judged.scene.kink_times:
@@ -486,7 +501,7 @@ def _has_kink(judged: JudgedDefects) -> NDArray[np.bool_]:
 
 
 def _tried_windows(judged: JudgedDefects, rows: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Choose windows of rows without a kink of a load, which begin at given intervals.
+    """Choose windows of FIT_ROWS rows, without a kink of a load, that begin at given intervals.
 
     Parameters
     ----------
@@ -496,7 +511,8 @@ def _tried_windows(judged: JudgedDefects, rows: NDArray[np.int64]) -> NDArray[np
     Returns
     -------
     ndarray
-        At most `_MAX_WINDOWS` of `rows`, each with FIT_ROWS - 1 judged intervals from it on.
+        First intervals of at most `_MAX_WINDOWS` windows, taken from `rows`. All FIT_ROWS - 1
+        intervals of a window are judged.
     """
     is_smooth = ~_has_kink(judged) & judged.is_judged
     count = len(is_smooth) - (FIT_ROWS - 2)
@@ -512,8 +528,9 @@ def _window_residuals(
 ) -> tuple[Array, Array, Array]:
     """Compute the residuals of the angles in each window after a fit of the scene's motion.
 
-    It is for data whose rates are fitted to their angles. The fitted rates are those with which the
-    closed form fits best, so that defects of single intervals show only a part of a mistake.
+    The residuals take the place of defects in data whose rates are fitted to the angles. With
+    fitted rates the closed form fits the data best, so that the defects of single intervals show
+    only a part of a mistake.
 
     Parameters
     ----------
@@ -523,16 +540,18 @@ def _window_residuals(
     Returns
     -------
     residuals, floors, from_intervals : ndarray
-        (k, FIT_ROWS half) rad, and what rounding makes of them; the change of the residuals by a
-        change of the intervals' ends, (k, FIT_ROWS half, (FIT_ROWS - 1) m).
+        (k, FIT_ROWS half) rad, with half = m / 2 angles in a row; the effect of rounding on the
+        residuals, in the same shape; and the derivative of the residuals with respect to the states
+        at the ends of the window's intervals, (k, FIT_ROWS half, (FIT_ROWS - 1) m).
     """
     defects = judged.defects
     count = len(defects.start)
     half = count // 2
     vectors, transitions = judged.values * judged.units, defects.transitions
     scale = np.concatenate([np.ones(half), judged.units[half:]])
-    # A deviation from the data's own states, carried on row by row, is design @ (deviation in the
-    # first row) + offset; by_ends is the derivative of the offset by the ends of all intervals.
+    # The deviation of the scene's motion from the data, carried from row to row, is design @
+    # (deviation in the first row) + offset. by_ends is the derivative of the offset with respect to
+    # the states at the ends of the intervals.
     design = [np.broadcast_to(np.eye(count), (len(windows), count, count))]
     offsets = [np.zeros((len(windows), count))]
     by_ends = [np.zeros((len(windows), count, (FIT_ROWS - 1) * count))]
@@ -544,7 +563,7 @@ def _window_residuals(
         derivative[:, :, row * count : (row + 1) * count] += np.eye(count)
         by_ends.append(derivative)
     angles = np.concatenate([matrix[:, :half] * scale for matrix in design], axis=1)
-    # The projection removes from the angles what any deviation in the first row may explain.
+    # The projection removes the part of the angles that a deviation in the first row explains.
     projection = np.eye(FIT_ROWS * half) - angles @ np.linalg.pinv(angles)
     offset = np.concatenate([offset[:, :half] for offset in offsets], axis=1)
     residuals = np.einsum("kij,kj->ki", projection, offset)
@@ -555,7 +574,7 @@ def _window_residuals(
 
 
 def _changed(scene: Scene, chosen: Sequence[Parameter], change: Array) -> RotorModel:
-    """Return the model of a scene whose parameters are changed by some amounts."""
+    """Return the model of a scene, with each of the chosen parameters changed by an amount."""
     model = RotorModel(scene)
     for parameter, amount in zip(chosen, change.tolist(), strict=True):
         model = parameter.apply(model, amount)
@@ -563,5 +582,5 @@ def _changed(scene: Scene, chosen: Sequence[Parameter], change: Array) -> RotorM
 
 
 def _least(explained: Sequence[Explanation[RotorModel]]) -> float:
-    """Return the least that an explanation leaves, infinity where there is none."""
+    """Return the smallest share that an explanation leaves; infinity if there is none."""
     return min((explanation.left for explanation in explained), default=math.inf)

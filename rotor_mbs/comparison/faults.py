@@ -1,7 +1,8 @@
-"""Faults at a time, recognized by the defects of one interval or of a few beside each other.
+"""Describe faults at a time in data: causes of large defects in a few neighbouring intervals.
 
-A row that is stuck, repeated or wrong, a load that jumps a row late, another state from some row
-on: each leaves defects of its own pattern in one to three intervals, and none in the others.
+Examples of faults are a stuck, repeated or wrong row, a load that jumps a row late, and a motion
+that continues from another state. Each kind of fault has its own pattern of defects in one interval
+or in a group of intervals. The other intervals have no defects.
 """
 
 from __future__ import annotations
@@ -21,33 +22,39 @@ from rotor_mbs.models.lagrange.parameters import rotor_form
 from rotor_mbs.scenario.time_table import torque_place
 from rotor_mbs.solution.trajectory import Array
 
-UNKNOWN_FAULT = "a fault"  # begins the text of a fault of which only the time is known
-_MAX_NAMED = 6  # faults
-_MAX_STEPS = 512  # of Runge and Kutta in an interval
-_STANDS_OUT = 30.0  # times the median of the defects
-_FAINT = 0.02  # of the largest defect: smaller ones are not reported beside it
-_EVERYWHERE = 0.6  # of the intervals
-# In the share _MOST of the other intervals, defects are within the tolerance, or at most the share
-# _OF_OTHERS of the largest defect.
+UNKNOWN_FAULT = "a fault"  # first words of the text on a fault without a recognized pattern
+_MAX_NAMED = 6  # largest number of groups of faulty intervals that are described
+_MAX_STEPS = 512  # largest number of Runge-Kutta steps in an interval
+# An interval is faulty if its defect is more than _STANDS_OUT times the median of all defects, and
+# more than the share _FAINT of the largest defect.
+_STANDS_OUT = 30.0
+_FAINT = 0.02
+_EVERYWHERE = 0.6  # largest share of faulty intervals: an error in more intervals is no fault
+# Faults explain the data only if the other intervals have small defects: at least the share _MOST
+# of them has defects within the tolerance, or of at most the share _OF_OTHERS of the largest one.
 _MOST, _OF_OTHERS = 0.9, 1e-3
-# A fault has edges if the median defect of the intervals next to faulty ones is at most this share
-# of the median of the faulty ones.
+# A fault has edges if the median defect of the intervals next to faulty intervals is at most this
+# share of the median defect of the faulty intervals.
 _EDGE = 0.1
-_GAP = 6  # intervals: faulty ones that are at most this far apart are one group
-_AT_END = 3  # intervals
+_GAP = 6  # faulty intervals whose numbers differ by at most this belong to one group
+_AT_END = 3  # number of intervals that count as an end of the data
 # If the median of all defects is more than this share of the largest defect, large defects at the
-# ends of the data have the same cause as the others, and are no faults.
+# ends of the data have the same cause as the defects in between, and are no faults.
 _OF_ENDS = 1e-3
-_PARALLEL = 0.995  # cosine
-_NEARLY = 0.05
-# Share of the defects that a constant load in each interval may leave: the actual load may change
-# within the interval, and its effect does as the rotor turns.
+_PARALLEL = 0.995  # smallest cosine of the angle between two vectors that count as parallel
+_NEARLY = 0.05  # relative difference of two numbers that count as equal
+# A load that is constant in each interval explains the defects if it leaves at most this share of
+# them. It leaves a part because the actual load may change within the interval, and because the
+# effect of a load changes as the rotor turns.
 _LEFT_OF_LOADS = 0.15
-_OF_COORDINATE = 0.1  # of a coordinate's defects: a load with a smaller share does not act on it
-_OF_USUAL = 10.0  # times a channel's median: smaller defects of it do not count
-_MIN_CLOCK = 3  # intervals that are late or early alike
-_MAX_DIRECTIONS = 20  # intervals of a fault for which loads are searched
-_SMALL_TURN = 1e-6  # rad, by the load whose effect is computed: far above round-off, still linear
+_OF_COORDINATE = 0.1  # a load that explains a smaller share of a coordinate's defects is ignored
+_OF_USUAL = 10.0  # the fit of loads gives less weight to defects below this many times the median
+_MIN_CLOCK = 3  # smallest number of intervals that show a wrong clock: all late, or all early
+# Rough number of intervals of a long fault for which loads are computed; it may be up to 39.
+_MAX_DIRECTIONS = 20
+# Angle (rad) by which the load whose effect is computed turns its coordinate in an interval: far
+# above round-off, and small enough for a linear effect.
+_SMALL_TURN = 1e-6
 
 
 def faults_in_time(judged: JudgedDefects) -> list[str]:
@@ -60,22 +67,23 @@ def faults_in_time(judged: JudgedDefects) -> list[str]:
     Returns
     -------
     list of str
-        The first `_MAX_NAMED` groups of faults, in words, and how many more there are. Empty where
-        most intervals are wrong, no defect is more than the tolerance, the defects do not end
-        abruptly, or the other intervals have errors, too.
+        Texts on the first `_MAX_NAMED` groups of faulty intervals, and one on the number of further
+        groups. The list is empty if no defect exceeds the tolerance, if most intervals are faulty,
+        if the large defects do not begin and end abruptly, or if the other intervals have errors,
+        too.
     """
     excess = judged.excess
     if judged.largest <= judged.tolerance:
         return []
-    # The median is that of right intervals, provided that most intervals are right.
+    # If most intervals are right, the median defect is that of a right interval.
     usual = float(np.median(excess[judged.is_judged])) if judged.is_judged.any() else 0.0
     wrong = np.flatnonzero(excess > max(_STANDS_OUT * usual, _FAINT * judged.largest))
-    # An error in most intervals is no fault at a time, though it may be larger in some than in
-    # others.
+    # An error in most intervals is no fault at a time, though it may be larger in some intervals
+    # than in others.
     if not len(wrong) or len(wrong) > _EVERYWHERE * len(excess):
         return []
-    # Defects that decrease gradually beside the largest ones are no fault at a time either: a fault
-    # has edges.
+    # A fault begins and ends abruptly. Defects that decrease gradually on both sides of the largest
+    # ones have another cause.
     edges = np.concatenate([wrong - 1, wrong + 1])
     is_interval = (edges >= 0) & (edges < len(excess))
     edges = edges[is_interval & ~np.isin(edges, wrong)]
@@ -83,14 +91,14 @@ def faults_in_time(judged: JudgedDefects) -> list[str]:
         beside = float(np.median(excess[edges]))
         if beside > _EDGE * float(np.median(excess[wrong])):
             return []
-    # The faults have to explain all: the defects of the other intervals are to be nearly zero.
+    # Faults explain the data only if the defects of all other intervals are nearly zero.
     others = np.delete(excess, wrong)
     of_others = float(np.quantile(others, _MOST))
     if of_others > max(judged.tolerance, _OF_OTHERS * judged.largest):
         return []
     groups = np.split(wrong, np.flatnonzero(np.diff(wrong) > _GAP) + 1)
-    # A filter, or differences in place of rates, makes errors in all rows, the largest at the ends:
-    # where the usual defects are large, groups at the ends are left out.
+    # A filter, or differences of angles in place of rates, causes errors in all rows, and the
+    # largest errors at the ends. Groups at the ends are left out if the median shows such errors.
     if usual > _OF_ENDS * judged.largest:
         last = len(excess) - _AT_END
         groups = [group for group in groups if group[-1] >= _AT_END and group[0] < last]
@@ -98,7 +106,8 @@ def faults_in_time(judged: JudgedDefects) -> list[str]:
     for group in groups[:_MAX_NAMED]:
         texts += _faults_of(judged, group)
     # The errors of an integrator are larger while the motion is fast. If the other intervals have
-    # errors, too, even within the tolerance, a period without a pattern is not named as a cause.
+    # errors, too, even within the tolerance, a group without a pattern may be such a fast part of
+    # the motion, and is not named as a cause.
     if of_others > _OF_OTHERS * judged.largest:
         texts = [text for text in texts if not text.startswith(UNKNOWN_FAULT)]
     if len(groups) > _MAX_NAMED:
@@ -108,7 +117,7 @@ def faults_in_time(judged: JudgedDefects) -> list[str]:
 
 
 def _faults_of(judged: JudgedDefects, group: NDArray[np.int64]) -> list[str]:
-    """Describe the fault of a group of intervals, or the faults of its parts.
+    """Describe the fault of a group of intervals, or one fault for each part of the group.
 
     Parameters
     ----------
@@ -118,8 +127,8 @@ def _faults_of(judged: JudgedDefects, group: NDArray[np.int64]) -> list[str]:
     Returns
     -------
     list of str
-        The faults in words; without a recognized pattern, the period of the fault and the
-        coordinate in which it is largest.
+        Texts on the faults. If no pattern is recognized, the only text has the period of the fault
+        and the coordinate with the largest defect.
     """
     text = _fault(judged, group)
     if text:
@@ -136,7 +145,7 @@ def _faults_of(judged: JudgedDefects, group: NDArray[np.int64]) -> list[str]:
 
 
 def _fault(judged: JudgedDefects, group: NDArray[np.int64]) -> str:
-    """Describe the fault of a group of intervals by its pattern; "" where it has none.
+    """Describe the fault of a group of intervals; return "" if no pattern is recognized.
 
     Parameters
     ----------
@@ -148,7 +157,7 @@ def _fault(judged: JudgedDefects, group: NDArray[np.int64]) -> str:
     text = _wrong_row(judged, group) or _wrong_clock(judged, group)
     if text:
         return text
-    # Loads are tried next: on which coordinates would they make such defects?
+    # Find the coordinates on which additional loads would cause these defects.
     chosen = group[:: max(1, len(group) // _MAX_DIRECTIONS)]
     loads, acting = _explaining_loads(judged, chosen)
     if len(acting) == 1:
@@ -168,15 +177,15 @@ def _fault(judged: JudgedDefects, group: NDArray[np.int64]) -> str:
 
 
 def _label(judged: JudgedDefects, place: int) -> str:
-    """Return the name of a coordinate by its place among those that move."""
+    """Return the name of a coordinate by its place among the moving coordinates."""
     return judged.scene.coordinate_labels[judged.defects.moving[place]]
 
 
 def _wrong_row(judged: JudgedDefects, group: NDArray[np.int64]) -> str:
-    """Describe a row that is repeated, stuck, wrong or at a wrong time; "" where it is none.
+    """Describe a row that is repeated, omitted, stuck or wrong; return "" if there is none.
 
-    The defect is the closed form less the data: it has the direction of the motion if the data lag
-    behind.
+    A row at a wrong time is described, too. A defect is the closed form minus the data, so that it
+    has the direction of the motion if the data lag behind.
 
     Parameters
     ----------
@@ -186,8 +195,8 @@ def _wrong_row(judged: JudgedDefects, group: NDArray[np.int64]) -> str:
     defects, units = judged.defects, judged.units
     first, last = int(group[0]), int(group[-1])
     values = judged.values[group]
-    # If a row is repeated, the defect is the motion over the interval; if a time is wrong by a
-    # small part of the interval, it is along the rate at the interval's end.
+    # If a row is repeated, the defect is the motion over the interval. If a time is wrong by a
+    # small part of the interval, the defect is parallel to the rate at the end of the interval.
     step_of_data = (defects.states[first + 1] - defects.states[first]) / units
     motion = values[0] + step_of_data
     rate = _state_rate(judged, first)
@@ -198,8 +207,8 @@ def _wrong_row(judged: JudgedDefects, group: NDArray[np.int64]) -> str:
         at = f"at t = {defects.time[last + 1]:.6g} s"
         return f"a row {event}, or times {clock} by less than an interval, {at}"
     if len(group) == 2 and last == first + 1:
-        # The second interval starts at the wrong row, and ends at a right one: its defect is that
-        # of the first interval, carried over the second, with the opposite sign.
+        # The second interval starts at the wrong row and ends at a right one. Its defect is the
+        # defect of the first interval, carried over the second interval, with the opposite sign.
         carried = defects.transitions[first + 1] @ (values[0] * units) / units
         if _cosine(values[1], -carried) >= _PARALLEL:
             row = f"row {first + 2}, t = {defects.time[first + 1]:.6g} s"
@@ -210,7 +219,9 @@ def _wrong_row(judged: JudgedDefects, group: NDArray[np.int64]) -> str:
 
 
 def _wrong_clock(judged: JudgedDefects, group: NDArray[np.int64]) -> str:
-    """Describe intervals over each of which the motion becomes late or early; "" if it does not.
+    """Describe a motion that gets later, or earlier, in every interval of a group.
+
+    Return "" if it does not.
 
     Parameters
     ----------
@@ -237,11 +248,11 @@ def _wrong_clock(judged: JudgedDefects, group: NDArray[np.int64]) -> str:
 
 
 def _change_of_state(judged: JudgedDefects, row: int) -> str:
-    """Describe the fault of a single interval, number `row`, that no load explains."""
+    """Describe the fault of interval number `row` as a jump of the rates, or of the state."""
     half = len(judged.defects.moving)
     start, end = (float(time) for time in judged.defects.time[row : row + 2])
-    # If the rates jump within the interval, the angles have changed by the jump times the rest of
-    # the interval, a share of its length between 0 and 1.
+    # If the rates jump within the interval, the angles change by the jump times the rest of the
+    # interval. The length of this rest is a share, between 0 and 1, of the whole interval.
     angles = judged.values[row, :half]
     rates = judged.values[row, half:] * judged.units[half:] * (end - start)
     share = float(angles @ rates) / (float(rates @ rates) or 1.0)
@@ -262,20 +273,21 @@ def _state_rate(judged: JudgedDefects, row: int) -> Array:
 
     Parameters
     ----------
-    judged : the defects of the data, whose `units` convert rates to rad.
+    judged : the defects of the data; its `units` divide the rates and accelerations.
     row : number of the interval.
     """
     states, time = judged.defects.states, judged.defects.time
     half = states.shape[1] // 2
     ahead = min(row + 2, len(states) - 1)
-    # The accelerations follow from the two rows beside the one that may be wrong.
+    # The row at the end of the interval may be wrong: the rows before and after it give the
+    # accelerations.
     acceleration = (states[ahead, half:] - states[row, half:]) / (time[ahead] - time[row])
     rates = states[row + 1, half:]
     return np.asarray(np.concatenate([rates, acceleration]) / judged.units)
 
 
 def _explaining_loads(judged: JudgedDefects, rows: NDArray[np.int64]) -> tuple[Array, list[int]]:
-    """Find the loads on the coordinates that explain the defects of some intervals best.
+    """Fit additional loads on the coordinates to the defects of some intervals.
 
     Parameters
     ----------
@@ -285,20 +297,21 @@ def _explaining_loads(judged: JudgedDefects, rows: NDArray[np.int64]) -> tuple[A
     Returns
     -------
     loads : ndarray
-        (k, coordinates) N m that the data have in addition.
+        (k, coordinates) N m, loads that the data have in addition to those of the scene.
     acting : list of int
-        Places of the coordinates on which they act; none where loads leave too much.
+        Places of the coordinates on which these loads act; empty if the loads leave too much of the
+        defects.
     """
     values, effects = judged.values[rows], _effect_of_unit_load(judged, rows)
     usual = np.median(np.abs(judged.values[judged.is_judged]), axis=0)
     usual = usual + AT_FLOOR * judged.floors[rows].max(axis=0)
-    # Each channel is scaled by its own size: a load may move a pitch by a million times as much as
-    # the rotor.
+    # Each channel is divided by its own size, because a load may turn a pitch a million times as
+    # far as the rotor.
     units = np.linalg.norm(values, axis=0) + _OF_USUAL * math.sqrt(len(rows)) * usual
     sizes = np.linalg.norm(effects / units, axis=2)
     if not (np.isfinite(sizes).all() and sizes.all()):
         return np.zeros(sizes.T.shape), []
-    # Least squares in each interval, over effects of unit size.
+    # Solve a least-squares problem in each interval, with the effects of loads scaled to unit size.
     matrices = (effects / units / sizes[:, :, None]).transpose(1, 2, 0)
     sides = (values / units)[:, :, None]
     solutions = (np.linalg.pinv(matrices) @ sides)[:, :, 0]
@@ -309,7 +322,7 @@ def _explaining_loads(judged: JudgedDefects, rows: NDArray[np.int64]) -> tuple[A
         return loads, []
     acting = []
     for place, part in enumerate(parts):
-        channels = [place, len(parts) + place]  # its angle and rate
+        channels = [place, len(parts) + place]  # angle and rate of the coordinate
         if np.linalg.norm(part[:, channels] / units[channels]) > _OF_COORDINATE:
             acting.append(place)
     return loads, acting
@@ -318,14 +331,16 @@ def _explaining_loads(judged: JudgedDefects, rows: NDArray[np.int64]) -> tuple[A
 def _load_jump_fault(
     judged: JudgedDefects, place: int, start: float, end: float, more: Array
 ) -> str:
-    """Describe a wrong load at a jump of a coordinate's prescribed load; "" if there is none.
+    """Describe a wrong load at a jump of a coordinate's prescribed load.
+
+    Return "" if there is no such jump, or the load is wrong in another way.
 
     Parameters
     ----------
     judged : the defects of the data.
     place : place of the coordinate among those that move.
-    start, end : s, the time over which the intervals extend.
-    more : (k,) N m that the data have in addition in these intervals.
+    start, end : s, start of the first interval and end of the last one.
+    more : (k,) N m, load in each interval that the data have in addition to that of the scene.
     """
     table = judged.scene.load_tables[torque_place(judged.defects.moving[place])]
     for (t0, value0), (t1, value1) in itertools.pairwise(table):
@@ -336,7 +351,8 @@ def _load_jump_fault(
         if len(more) == 1 and abs(abs(more[0] / jump) - 1.0) <= _NEARLY:
             side = "late" if more[0] / jump < 0.0 else "early"
             return f"jumps a row {side} at t = {t0:.6g} s, or has a wrong value in this row"
-        # A load that is smoothed over a jump is too large in one interval, too small in the next.
+        # A load that is smoothed over an upward jump is too large in the interval before the jump,
+        # and too small in the next interval.
         is_balanced = abs(more.sum()) <= _NEARLY * np.abs(more).max()
         if len(more) == 2 and is_balanced and more[0] / jump > 0.0:
             return f"is smoothed over its jump at t = {t0:.6g} s"
@@ -344,7 +360,7 @@ def _load_jump_fault(
 
 
 def _effect_of_unit_load(judged: JudgedDefects, rows: NDArray[np.int64]) -> Array:
-    """Compute the change of an interval's end by 1 N m on each of the moving coordinates.
+    """Compute how 1 N m on each moving coordinate changes the states at the ends of intervals.
 
     Parameters
     ----------
@@ -354,7 +370,7 @@ def _effect_of_unit_load(judged: JudgedDefects, rows: NDArray[np.int64]) -> Arra
     Returns
     -------
     ndarray
-        (coordinates, k, m) rad per N m.
+        (coordinates, k, m) rad per N m, of the angles, then the rates.
     """
     scene, defects, form = judged.scene, judged.defects, rotor_form(judged.scene)
     begins, ends = defects.time[rows], defects.time[rows + 1]
@@ -366,7 +382,7 @@ def _effect_of_unit_load(judged: JudgedDefects, rows: NDArray[np.int64]) -> Arra
     longest = float((ends - begins).max())
     effects = []
     for place, inertia in enumerate(inertias):
-        # A torque that moves the coordinate by a small angle, whatever its inertia.
+        # The torque is proportional to the inertia: every coordinate turns by the same small angle.
         torque = _SMALL_TURN * float(inertia) / longest**2
         pushed = quick_ends(scene, begins, ends, states, steps, _with_torque(place, torque))
         effects.append((pushed - free).T / judged.units / torque)
@@ -378,8 +394,8 @@ def _with_torque(place: int, torque: float) -> closed_form.Accelerations:
 
     Parameters
     ----------
-    place : 0 for the rotor, from 1 on the pitches.
-    torque : N m.
+    place : 0 for the rotor; 1, 2, ... for the pitches that move.
+    torque : N m, the additional torque.
     """
 
     def equations(angles: Any, rates: Any, form: Any, loads: Any, *functions: Any) -> Any:
@@ -395,6 +411,6 @@ def _with_torque(place: int, torque: float) -> closed_form.Accelerations:
 
 
 def _cosine(first: Array, second: Array) -> float:
-    """Return the cosine between two vectors, 0 where one is zero."""
+    """Return the cosine of the angle between two vectors; 0 if one of them is zero."""
     size = float(np.linalg.norm(first) * np.linalg.norm(second))
     return float(first @ second) / size if size else 0.0
