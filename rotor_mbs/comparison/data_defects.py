@@ -1,4 +1,4 @@
-"""Interval defects of data, which may lack angles or rates, and what of them is beyond rounding."""
+"""Compute the interval defects of data that may lack angles or rates, and judge their rounding."""
 
 from __future__ import annotations
 
@@ -14,12 +14,14 @@ from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.defects import Defects
 from rotor_mbs.solution.trajectory import Array, Trajectory
 
-STRETCHES = (10, 100)  # rows over which defects are added up, too
-AT_FLOOR = 3.0  # times the rounding, as it is estimated
+STRETCHES = (10, 100)  # numbers of rows over which defects are added up, to show a drift
+AT_FLOOR = 3.0  # the effect of rounding on a defect may be this many times its estimate
 
 
 def carried_errors(reference: Trajectory, growth: Array, units: Array) -> Array:
-    """Return the largest errors that a relative error of 1 at the start may have grown to.
+    """Return the size to which a relative error of 1 in the initial state may have grown.
+
+    The error is relative to the largest angle up to a row, or to 1 rad if all angles are smaller.
 
     Parameters
     ----------
@@ -29,7 +31,7 @@ def carried_errors(reference: Trajectory, growth: Array, units: Array) -> Array:
     Returns
     -------
     ndarray
-        (n, 2 (1 + blades)) of each angle, rad, then rate, rad/s.
+        (n, 2 (1 + blades)) errors of the angles, rad, then of the rates, rad/s.
     """
     sizes = np.maximum(np.abs(reference.angles).max(axis=1), 1.0)
     largest = np.maximum.accumulate(sizes)
@@ -38,7 +40,7 @@ def carried_errors(reference: Trajectory, growth: Array, units: Array) -> Array:
 
 
 def states_of(run: Trajectory) -> Array:
-    """Return the states of a run, angles, then rates, (n, 2 (1 + blades))."""
+    """Return the states of a run: angles, then rates, (n, 2 (1 + blades))."""
     return np.hstack([run.angles, run.rates])
 
 
@@ -47,8 +49,9 @@ def defects_of_data(
 ) -> tuple[Defects | None, str]:
     """Compute the interval defects of data.
 
-    Angles that the data lack are taken from the reference, and defects are computed up to the
-    horizon alone; rates that they lack are found from the angles.
+    If the data have all angles, missing rates are fitted to the angles. If angles are missing, the
+    reference replaces all missing angles and rates, and defects are computed only up to the
+    horizon.
 
     Parameters
     ----------
@@ -59,7 +62,8 @@ def defects_of_data(
     Returns
     -------
     Defects or None, str
-        The defects, None where they cannot be known; a note on how they were found, or "".
+        The defects, None if they cannot be computed; a note on fitted rates, or on why rates cannot
+        be fitted, else "".
     """
     count = len(scene.initial_angles)
     states = states_of(reference).copy()
@@ -98,18 +102,21 @@ def defects_of_data(
 
 @dataclass(frozen=True)
 class JudgedDefects:
-    """Defects of data in rad, and how much of them is beyond rounding.
+    """Hold the defects of data in rad, and their part beyond rounding.
+
+    The data have n rows; m is twice the number of moving coordinates.
 
     Attributes
     ----------
     scene, defects : the rotor, and the interval defects of the data.
-    tolerance : rad, of an interval's defect.
-    units : (m,) what counts as 1 rad: 1 rad of an angle, some rad/s of a rate.
-    values, floors : (n - 1, m) rad, signed defects of the moving coordinates, angles, then rates,
-        and what rounding makes of them.
-    is_judged : (n - 1,) intervals that count.
-    excess : (n - 1,) rad, the largest of an interval beyond rounding.
-    has_fitted_rates : whether the rates are computed from the angles.
+    tolerance : rad, the largest allowed defect of an interval.
+    units : (m,) sizes that count as 1 rad: 1 rad for an angle, a number of rad/s for a rate.
+    values : (n - 1, m) rad, signed defects of the moving coordinates: angles, then rates.
+    floors : (n - 1, m) rad, estimates of the effect of rounding on `values`.
+    is_judged : (n - 1,) whether an interval counts: its defects are finite, and rounding explains
+        at most 0.01 rad of them.
+    excess : (n - 1,) rad, largest defect of an interval beyond rounding; 0 if it does not count.
+    has_fitted_rates : whether the rates are fitted to the angles.
     """
 
     scene: Scene
@@ -136,19 +143,20 @@ class JudgedDefects:
 def judged_defects(
     scene: Scene, defects: Defects, tolerance: float, *, has_fitted_rates: bool = False
 ) -> JudgedDefects:
-    """Find how much of the defects of data is beyond rounding.
+    """Compute the part of the defects of data that is beyond rounding.
 
     Parameters
     ----------
     scene, defects : the rotor, and the interval defects of the data.
-    tolerance : rad, of an interval's defect.
-    has_fitted_rates : whether the rates are computed from the angles.
+    tolerance : rad, the largest allowed defect of an interval.
+    has_fitted_rates : whether the rates are fitted to the angles.
     """
     moving = list(defects.moving)
     vectors = np.hstack([defects.angles[:, moving], defects.rates[:, moving]])
     units = np.concatenate([np.ones(len(moving)), defects.rate_units[moving]])
     values = vectors / units
-    # The rounding of a number near zero is too small as a measure of its channel's.
+    # A number near zero has less rounding than the other numbers of its channel. Floors therefore
+    # have a lower limit, a share of the channel's median.
     floors = np.maximum(defects.floors, 0.3 * np.median(defects.floors, axis=0) + 1e-18)
     is_judged = defects.is_resolved & np.isfinite(vectors).all(axis=1)
     sizes = np.abs(np.where(is_judged[:, None], values, 0.0))

@@ -1,7 +1,8 @@
-"""Mistakes in the columns and times of a trajectory: units, signs, zeros, turns, lags, exchanges.
+"""Search for mistakes in the columns and times of a trajectory.
 
-A mistake is searched for by comparison with the reference, which is integrated from its row before
-a time up to that time. It explains the data if the data without it have no defects.
+Examples are wrong units, signs and zeros, missing turns, lags, and exchanged columns. The data are
+compared with the reference; for a time between two of its rows, the reference is integrated from
+the row before. A mistake explains the data if the corrected data have hardly any defects.
 """
 
 from __future__ import annotations
@@ -39,45 +40,55 @@ from rotor_mbs.solution.defects import FLOOR_SAFETY
 from rotor_mbs.solution.metrics import horizon
 from rotor_mbs.solution.trajectory import Array, Trajectory
 
-# A mistake fits if it leaves an error within the tolerance, or at most this share of the error and
-# at most that size.
+# A mistake fits if the error that it leaves is within the tolerance. It also fits if this error is
+# at most the share _LEFT of the error of the data, and at most _MAX_LEFT per unit of error growth.
 _LEFT, _MAX_LEFT = 1e-3, 1e-4
-MIN_ROWS = 5  # with fewer, something always fits
+MIN_ROWS = 5  # smallest number of rows of a search: some mistake always fits fewer rows
 _TIME_FACTORS = (
     (1e-3, "time in ms taken as s"),
     (1e-6, "time in us taken as s"),
     (60.0, "time in minutes taken as s"),
 )
-_MIN_LAG = 1e-4  # of an interval between rows: a smaller lag is rounding
-_WHOLE_ROWS = 1e-3  # of a row: a lag this near to a whole number of rows is that number
-_LAG_ROW = 50  # by which a lag is measured
-_LAG_ROUNDS = 8  # of Gauss and Newton's iteration
-_MAX_OFF = 30.0  # times the median distance from the reference, of columns by which a time is found
-_MAX_CLOCK, _MIN_CLOCK = 1.2, 1e-7  # factor of a clock; what differs less is rounding
-_TIME_ROUNDING = 1e-9  # of the duration
-_MIN_COVERED = 0.3  # of the duration: in a short part of a motion anything fits
-_MAX_PERIOD = 20  # rows from one that is computed to the next
+_MIN_LAG = 1e-4  # smallest lag, in intervals between rows: a smaller lag is rounding
+_WHOLE_ROWS = 1e-3  # a lag in rows counts as a whole number if it differs by less than this
+_LAG_ROW = 50  # number of the row whose lag is measured; in short data it is an earlier row
+_LAG_ROUNDS = 8  # number of Gauss-Newton iterations for the time of a row
+# A column is not used to find the time of a row if its distance from the reference is more than
+# this many times the median distance of the columns.
+_MAX_OFF = 30.0
+# Largest factor of a wrong clock; smallest difference of the factor from 1 that is not rounding.
+_MAX_CLOCK, _MIN_CLOCK = 1.2, 1e-7
+_TIME_ROUNDING = 1e-9  # share of the duration by which rounding may make a time exceed it
+# Smallest share of the duration that rows in another unit of time must cover: in a short part of a
+# motion, any unit fits.
+_MIN_COVERED = 0.3
+_MAX_PERIOD = 20  # largest number of rows from a computed row to the next, in interpolated data
+# A spline is first tried on this many rows. There the allowed difference is larger, by this share
+# of the largest number of a column.
 _FIRST_ROWS, _NEARLY_BETWEEN = 401, 1e-6
-_MIN_KNOTS = 5  # fewer rows are on one polynomial, or nearly so
-_NOT_BY_CHANCE = 10.0  # times what is allowed of rows: distance of the right ones from a spline
-_INTERPOLATED = 1e-9  # of the largest number: error of the arithmetic of interpolation
-# Long data are first searched in some windows of rows: what explains all rows explains these, by a
-# bound that is this much wider, as errors differ from window to window.
+_MIN_KNOTS = 5  # smallest number of knots of a spline: a polynomial fits fewer rows, or nearly so
+# Data are called interpolated only if the reference would not pass as interpolated itself: one of
+# its rows must be off the spline by more than this many times the allowed difference.
+_NOT_BY_CHANCE = 10.0
+_INTERPOLATED = 1e-9  # rounding error of an interpolation, as a share of a column's largest number
+# Long data are first searched in _WINDOWS windows of _WINDOW_ROWS rows: a mistake that explains all
+# rows explains these rows, too. The bound is _WIDER times as wide there, because errors differ from
+# window to window.
 _WINDOWS, _WINDOW_ROWS, _WIDER = 3, 500, 10.0
 
 
 @dataclass(frozen=True)
 class TrajectorySearch:
-    """Data with all their rows, and what a search for mistakes compares them with.
+    """Hold the data of a search for mistakes, the reference, and the allowed errors.
 
     Attributes
     ----------
-    scene, data : the rotor; the data, all rows.
+    scene, data : the rotor; the data with all rows, also those after the scene's end.
     exact : the reference at the times of the data and at the scene's samples.
-    tolerance : rad, of an interval's defect.
-    worst : the largest error per unit of error growth.
-    is_within_tolerance : whether the data agree, and a smaller difference is searched for. Then a
-        lag is not, as it may be an integrator's own error.
+    tolerance : rad, the largest allowed defect of an interval.
+    worst : the largest error of the data up to the horizon, per unit of error growth.
+    is_within_tolerance : whether the data agree, and the search is for the cause of a smaller
+        difference. A lag is not searched for then, because it may be an integrator's own error.
     """
 
     scene: Scene
@@ -88,7 +99,9 @@ class TrajectorySearch:
     is_within_tolerance: bool = False
 
     def states_at(self, time: Array) -> Array:
-        """Compute the motion at other times, integrated from the reference's row before each.
+        """Compute the reference motion at given times.
+
+        The motion is integrated to each time from the last row of the reference before it.
 
         Parameters
         ----------
@@ -97,7 +110,7 @@ class TrajectorySearch:
         Returns
         -------
         ndarray
-            (n, 2 (1 + blades)) angles, then rates.
+            (n, 2 (1 + blades)) angles, rad, then rates, rad/s.
         """
         run, moving = self.exact.trajectory, self.scene.moving_coordinates
         before = np.searchsorted(run.time, time, side="right") - 1
@@ -117,7 +130,7 @@ class TrajectorySearch:
         return data.rows((data.time >= 0.0) & (data.time <= end))
 
     def carried(self, time: Array) -> Array:
-        """Return `carried_errors` at (n,) times up to the horizon, (n, 2 (1 + blades))."""
+        """Return `carried_errors`, interpolated at (n,) times, (n, 2 (1 + blades))."""
         run = self.exact.trajectory
         carried = carried_errors(run, self.exact.growth, self.exact.units)
         columns = [np.interp(time, run.time, column) for column in carried.T]
@@ -125,13 +138,15 @@ class TrajectorySearch:
 
     @property
     def allowed(self) -> float:
-        """Return the largest error per unit of growth, and defect, that a mistake may leave."""
+        """Return the largest error per unit of growth, and largest defect, that may be left."""
         return max(self.tolerance, min(_LEFT * self.worst, _MAX_LEFT))
 
     def defect_left(self, correction: Correction) -> float:
-        """Return the largest defect of corrected data beyond rounding, rad; 0 where none is known.
+        """Return the largest defect of corrected data beyond rounding, rad.
 
-        Columns that cannot be corrected have been compared with the reference before.
+        Sums of defects over longer stretches count as defects, too. The result is 0 if no defects
+        can be computed, for example because no column can be corrected. Such columns have been
+        compared with the reference before.
 
         Parameters
         ----------
@@ -162,22 +177,22 @@ class TrajectorySearch:
 
 @dataclass(frozen=True)
 class Correction:
-    """Corrected data, None where no column can be corrected; the columns' mistakes in words."""
+    """Hold corrected data, None if no column can be corrected, and the mistakes in words."""
 
     data: ForeignData | None
     mistakes: tuple[str, ...] = ()
 
 
 def data_mistakes(search: TrajectorySearch) -> list[str]:
-    """Search for mistakes in the columns, and for those in the rows with any in the columns."""
+    """Search for mistakes in the columns; if none explains the data, also in rows and times."""
     return column_mistakes(search) or _row_mistakes(search, _row_hypotheses(search))
 
 
 def clock_mistakes(search: TrajectorySearch) -> list[str]:
     """Search for a clock that is fast or slow, alone or with a mistake in the columns.
 
-    In a motion under gravity alone, another clock and another gravity change the angles alike: then
-    both are named as causes.
+    In a motion under gravity alone, a wrong clock and a wrong gravity change the angles alike. The
+    clock is then named in addition to the gravity.
     """
     return _row_mistakes(search, _clocks(search))
 
@@ -185,7 +200,10 @@ def clock_mistakes(search: TrajectorySearch) -> list[str]:
 def _row_mistakes(
     search: TrajectorySearch, hypotheses: Iterator[Hypothesis[ForeignData]]
 ) -> list[str]:
-    """Return the first mistake in the rows that explains the data, with one in the columns."""
+    """Return the first mistake in rows or times that explains the data.
+
+    A mistake in the columns may come with it.
+    """
     for hypothesis in hypotheses:
         texts = column_mistakes(search, hypothesis)
         if texts:
@@ -204,27 +222,28 @@ def column_mistakes(
     Parameters
     ----------
     search : the data and the reference.
-    times : a mistake in the rows or times, and the data without it; by default there is none.
+    times : a mistake in rows or times, with the data corrected for it; None for no such mistake.
     with_factor : whether a channel may be wrong by any factor.
 
     Returns
     -------
     list of str
-        The mistakes in words, with one in the times as a single text; none where they do not
-        explain the data.
+        The mistakes in words; a mistake in rows or times is in one text with that in the columns.
+        Empty if mistakes do not explain the data.
     """
     data = times.change if times is not None else search.data
     inside = search.up_to_horizon(data)
     if len(inside.time) < MIN_ROWS or not _may_explain(search, inside, with_factor=with_factor):
         return []
     hypotheses = _column_hypotheses(search, data, inside, with_factor=with_factor)
-    # Columns without a mistake explain the data only together with a mistake in the times.
+    # Columns without a mistake explain the data only if there is a mistake in rows or times.
     mistaken = (each for each in hypotheses if each.text or times is not None)
     explanation = next(explanations(mistaken, search.defect_left, search.allowed), None)
     if explanation is None:
         return []
     mistakes = explanation.hypothesis.change.mistakes
-    # Beside a mistake in the times one in the columns is accepted: more would explain anything.
+    # With a mistake in the times, at most one in the columns is accepted: several mistakes would
+    # explain any data.
     if times is not None and len(mistakes) > 1:
         return []
     return list(mistakes) if times is None else ["; and ".join([times.text, *mistakes])]
@@ -234,7 +253,7 @@ def column_mistakes(
 
 
 def _row_hypotheses(search: TrajectorySearch) -> Iterator[Hypothesis[ForeignData]]:
-    """Yield possible mistakes in rows and times, and the data without each."""
+    """Yield possible mistakes in rows and times, each with the data corrected for it."""
     yield from _times_in_other_units(search)
     yield from _rows_between(search)
     if not search.is_within_tolerance:
@@ -246,7 +265,7 @@ def _row_hypotheses(search: TrajectorySearch) -> Iterator[Hypothesis[ForeignData
 
 
 def _times_in_other_units(search: TrajectorySearch) -> Iterator[Hypothesis[ForeignData]]:
-    """Yield the data with other times: ms, us, minutes, row numbers, sums in single precision.
+    """Yield mistakes in the times: ms, us, minutes, row numbers, sums in single precision.
 
     Parameters
     ----------
@@ -261,7 +280,7 @@ def _times_in_other_units(search: TrajectorySearch) -> Iterator[Hypothesis[Forei
         time, rounding = data.time * factor, data.time_rounding * factor
         if time[-1] >= _MIN_COVERED * search.scene.duration:
             yield Hypothesis(text, replace(data, time=time, time_rounding=rounding))
-    # A clock that adds up a step in single precision is late or early by thousandths of a step.
+    # Times that are sums of a step in single precision are wrong by thousandths of a step.
     single = data.time.astype(np.float32)
     step = single[1] - single[0]
     summed = np.cumsum(np.append(single[:1], np.full(count - 1, step)), dtype=np.float32)
@@ -273,7 +292,7 @@ def _times_in_other_units(search: TrajectorySearch) -> Iterator[Hypothesis[Forei
 
 
 def _rows_between(search: TrajectorySearch) -> Iterator[Hypothesis[ForeignData]]:
-    """Yield the rows that are not held or interpolated, where a period of such rows is found.
+    """Yield every n-th row of the data, if the rows in between are held or interpolated.
 
     Parameters
     ----------
@@ -290,11 +309,11 @@ def _rows_between(search: TrajectorySearch) -> Iterator[Hypothesis[ForeignData]]
     largest = np.abs(data.values).max(axis=0)
     allowed = AT_FLOOR * data.rounding + _INTERPOLATED * largest
     for degree, text in ((1, "linearly"), (3, "by a cubic spline")):
-        # What is interpolated between every fourth row is between every second one, too: periods
-        # are tried from the longest on.
+        # Data that are interpolated between every fourth row are also interpolated between every
+        # second row. The longest period is the right one: it is tried first.
         for period in range(min(_MAX_PERIOD, count // MIN_ROWS), 1, -1):
-            # The first rows refute most periods. A spline of them alone is wrong near their end,
-            # and less so farther from it: their first quarter is compared.
+            # The first rows are enough to exclude most periods. A spline through these rows alone
+            # is wrong near the last of them: only their first quarter is compared.
             first = _left_between(
                 data.time[:_FIRST_ROWS], data.values[:_FIRST_ROWS], period, degree
             )
@@ -304,7 +323,8 @@ def _rows_between(search: TrajectorySearch) -> Iterator[Hypothesis[ForeignData]]
             left = _left_between(data.time, data.values, period, degree)
             if not (left <= allowed[: len(left)]).all():
                 continue
-            # A slow motion lies nearly on a spline itself: then nothing is concluded.
+            # A slow motion lies nearly on a spline without being interpolated. Such a motion is no
+            # evidence of interpolation.
             of_right = _left_between(inside.time, right, period, degree)
             if (of_right > _NOT_BY_CHANCE * allowed[: len(of_right)]).any():
                 text = f"interpolated {text} between every {period} rows"
@@ -313,19 +333,19 @@ def _rows_between(search: TrajectorySearch) -> Iterator[Hypothesis[ForeignData]]
 
 
 def _left_between(time: Array, values: Array, period: int, degree: int) -> Array:
-    """Return the differences between rows and a spline through every few of them.
+    """Return the absolute differences between rows and a spline through some of the rows.
 
     Parameters
     ----------
     time, values : (n,) s, (n, columns) rad and rad/s.
-    period : number of rows from one on the spline to the next.
-    degree : of the spline's polynomials, 1 or 3.
+    period : number of rows from a knot of the spline to the next.
+    degree : degree of the spline's polynomials, 1 or 3.
 
     Returns
     -------
     ndarray
-        (rows up to the last on the spline, columns), of the better of two end conditions; infinite
-        where too few rows are on it.
+        (rows up to the last knot, columns) rad and rad/s; for a cubic spline, the differences with
+        the better of two end conditions. Infinite if the spline has too few knots.
     """
     last = (len(time) - 1) // period * period + 1
     knots = slice(0, last, period)
@@ -341,7 +361,7 @@ def _left_between(time: Array, values: Array, period: int, degree: int) -> Array
 
 
 def _lags(search: TrajectorySearch) -> Iterator[Hypothesis[ForeignData]]:
-    """Yield the data without a constant lag of their times.
+    """Yield the data corrected for a constant lag of their times, if there is one.
 
     Parameters
     ----------
@@ -349,7 +369,7 @@ def _lags(search: TrajectorySearch) -> Iterator[Hypothesis[ForeignData]]:
     """
     data, end = search.data, horizon(search.exact.trajectory)
     step = float(np.median(np.diff(data.time)))
-    # Not the first row: at the start the motion may be slow, and the lag hardly seen.
+    # The first row is not used: the motion may be slow at the start, where a lag has little effect.
     row = min(_LAG_ROW, len(data.time) // 4)
     lag = float(data.time[row]) - _time_of_row(search, row, 0.0, end)
     if abs(lag) > _MIN_LAG * step:
@@ -386,13 +406,15 @@ def _clocks(search: TrajectorySearch) -> Iterator[Hypothesis[ForeignData]]:
 def _time_of_row(search: TrajectorySearch, row: int, first: float, last: float) -> float:
     """Find the time, s, at which the reference is nearest to a row of the data.
 
-    Gauss and Newton's iteration over the time, which starts at the nearest row of the reference.
+    A Gauss-Newton iteration over the time starts at the nearest row of the reference. If the
+    reference has no rows within the limits, or does not move, the data's own time is returned.
 
     Parameters
     ----------
     search : the data and the reference.
     row : number of the row of the data.
-    first, last : s, the times between which is searched, at most up to the horizon.
+    first, last : s, limits of the time at which the iteration starts. The iteration stays before
+        `last`, and before the horizon.
     """
     data, run = search.data, search.exact.trajectory
     columns, end = data.columns, min(horizon(run), last)
@@ -401,8 +423,8 @@ def _time_of_row(search: TrajectorySearch, row: int, first: float, last: float) 
         return float(data.time[row])
     states = states_of(run)[is_tried][:, columns]
     distances = np.abs(states - data.values[row])
-    # The distance is the median over the columns that move, and those far beyond it are left out:
-    # they may have a mistake of their own.
+    # The distance of a row is the median over the columns that move. Columns that are far beyond
+    # the median are left out below, because they may have a mistake of their own.
     is_moving = np.ptp(states, axis=0) > 0.0
     if not is_moving.any():
         return float(data.time[row])
@@ -411,7 +433,7 @@ def _time_of_row(search: TrajectorySearch, row: int, first: float, last: float) 
     time = float(run.time[is_tried][nearest])
     is_right = is_moving & (distances[nearest] <= _MAX_OFF * usual[nearest])
     columns = [column for column, right in zip(columns, is_right, strict=True) if right]
-    step = 1e-6 * max(end, 1e-9)  # for the derivative
+    step = 1e-6 * max(end, 1e-9)  # s, for the difference quotient
     for _ in range(_LAG_ROUNDS):
         here, ahead = search.states_at(np.array([time, time + step]))[:, columns]
         slope = (ahead - here) / step
@@ -431,8 +453,8 @@ def _column_hypotheses(
 
     Parameters
     ----------
-    search : the reference, and what may be left.
-    data, inside : all rows of the data, and those up to the horizon.
+    search : the reference, and the largest error that a mistake may leave.
+    data, inside : the data with all rows, and with the rows up to the horizon.
     with_factor : whether a channel may be wrong by any factor.
     """
     states, carried = search.states_at(inside.time), search.carried(inside.time)
@@ -450,7 +472,7 @@ def _column_hypotheses(
     if largest <= search.allowed and chosen != columns:
         yield _exchange(search.scene, data, chosen)
         return
-    # Columns that are exchanged often come with degrees: alone, neither mistake explains the data.
+    # Exchanged columns are often in degrees, too. Neither mistake explains such data alone.
     chosen, largest = _nearest_channels(_from_degrees(inside), states, carried)
     if largest <= search.allowed and chosen != columns:
         exchange = _exchange(search.scene, _from_degrees(data), chosen)
@@ -460,11 +482,13 @@ def _column_hypotheses(
 
 
 def _may_explain(search: TrajectorySearch, inside: ForeignData, *, with_factor: bool) -> bool:
-    """Return whether mistakes in the columns may explain long data, from some of their rows.
+    """Return whether mistakes in the columns may explain data, tested on windows of their rows.
+
+    Short data are not tested: the result is True.
 
     Parameters
     ----------
-    search : the reference, and what may be left.
+    search : the reference, and the largest error that a mistake may leave.
     inside : rows of the data up to the horizon.
     with_factor : whether a channel may be wrong by any factor.
     """
@@ -477,7 +501,7 @@ def _may_explain(search: TrajectorySearch, inside: ForeignData, *, with_factor: 
         states, carried = search.states_at(window.time), search.carried(window.time)
         readings = _readings(wider, window, states, carried, with_factor=with_factor)
         places = range(len(window.channels))
-        # Of a column that is held or limited, a window may show too little.
+        # A window may show too little of a column that is held or limited.
         if all(held_rows(window.values[:, [j]]) != 1 or readings.best(j) for j in places):
             continue
         largest = min(
@@ -497,7 +521,7 @@ def _readings(
     *,
     with_factor: bool,
 ) -> ColumnReadings:
-    """Return the readings of the columns of data, by what a search allows to be left."""
+    """Return the readings of the columns of data, with the allowed errors of a search."""
     return ColumnReadings(
         data,
         states,
@@ -512,7 +536,7 @@ def _readings(
 def _nearest_channels(
     inside: ForeignData, states: Array, carried: Array
 ) -> tuple[list[int], float]:
-    """Assign each column the channel that it is nearest to; columns may be exchanged.
+    """Assign to each column its nearest channel, to find columns that are exchanged.
 
     Parameters
     ----------
@@ -522,31 +546,33 @@ def _nearest_channels(
     Returns
     -------
     list of int, float
-        For each column the place of a channel, and the largest error per unit of growth.
+        For each column the place of its channel; the largest error of the columns with these
+        channels, per unit of growth.
     """
-    # Rates may be exchanged with angles, too. Each column is assigned another channel, so that the
-    # sum of the logarithms of the errors is least: a sum of the errors would depend on the largest
-    # one alone.
+    # Rates may be exchanged with angles, too: each column is compared with all channels. The sum of
+    # the logarithms of the errors is minimized below, because a sum of the errors would depend on
+    # the largest error alone.
     errors = np.empty((len(inside.columns), states.shape[1]))
     for j, values in enumerate(inside.values.T):
         errors[j] = (np.abs(values[:, None] - states) / carried).max(axis=0)
     preference = np.zeros_like(errors)
     places = range(len(errors))
-    preference[places, inside.columns] = -1e-3  # among equal errors a column keeps its own channel
+    preference[places, inside.columns] = -1e-3  # if errors are equal, a column keeps its channel
     sizes = np.log10(np.clip(errors, 1e-16, 1e16)) + preference
-    # Columns are exchanged, or one is written in place of another, too.
+    # If columns are exchanged, no two of them have the same channel. If a column is written in
+    # place of another one, two have the same channel. The better of both assignments is taken.
     _, exchanged = linear_sum_assignment(sizes)
     chosen = min(exchanged, sizes.argmin(axis=1), key=lambda columns: errors[places, columns].max())
     return chosen.tolist(), float(errors[places, chosen].max())
 
 
 def _from_degrees(data: ForeignData) -> ForeignData:
-    """Return data whose angles are in degrees, and rates in deg/s, with both in rad and rad/s."""
+    """Return data converted from degrees and deg/s to rad and rad/s."""
     return replace(data, values=DEGREE * data.values, rounding=DEGREE * data.rounding)
 
 
 def _degree_texts(data: ForeignData) -> list[str]:
-    """Return a text for the angles of data, and one for the rates, that all are in degrees."""
+    """Return the mistake that all angles are in degrees, and the same for the rates, in words."""
     texts = []
     for kind, text in DEGREE_TEXTS.items():
         names = [channel.name for channel in data.channels if channel.kind == kind]
@@ -560,19 +586,19 @@ def _corrected_channels(readings: ColumnReadings) -> Hypothesis[Correction] | No
 
     Parameters
     ----------
-    readings : of the columns of the data.
+    readings : the readings of all columns of the data.
 
     Returns
     -------
     Hypothesis or None
-        The mistakes and the data without them; None where a channel fits no reading, or the
+        The mistakes and the data corrected for them; None if no reading fits some channel, or the
         readings are not plausible together.
     """
     data = readings.data
     names: dict[str, list[str]] = {}
     kept, values, roundings = [], [], []
     processed = set()
-    has_right_motion = False  # a column that moves, and in which nothing is wrong
+    has_right_motion = False  # whether some column moves, and nothing is wrong in it
     for j, channel in enumerate(data.channels):
         reading = readings.best(j)
         if reading is None:
@@ -586,8 +612,8 @@ def _corrected_channels(readings: ColumnReadings) -> Hypothesis[Correction] | No
             kept.append(j)
             values.append(reading.corrected)
             roundings.append(reading.rounding)
-    # Columns that are processed in different ways fit by chance; and if all columns are late or
-    # held, the rows are, not the columns.
+    # Columns that are processed in different ways fit by chance. If all columns that move are late
+    # or held, the mistake is in the rows, not in the columns.
     is_of_rows = any(text.endswith(LATE_OR_EARLY) or text.startswith(HELD) for text in processed)
     if len(processed) > 1 or (is_of_rows and not has_right_motion and len(data.channels) > 1):
         return None
@@ -601,7 +627,7 @@ def _corrected_channels(readings: ColumnReadings) -> Hypothesis[Correction] | No
         rounding=np.stack(roundings, axis=1),
         wrapped=tuple(data.wrapped[j] for j in kept if data.wrapped),
     )
-    # The last rows of a channel that is some rows late are not in the data.
+    # A channel that is some rows late has no right numbers in the last rows: they are left out.
     is_known = np.asarray(np.isfinite(corrected.values).all(axis=1))
     correction = Correction(corrected.rows(is_known), mistakes)
     return Hypothesis("; and ".join(mistakes), correction, len(mistakes))
@@ -614,7 +640,7 @@ def _exchange(scene: Scene, data: ForeignData, chosen: Sequence[int]) -> Hypothe
     ----------
     scene : the rotor, with its channels.
     data : the data, whose columns are assigned other channels.
-    chosen : for each column the place of another channel, see `ForeignData.columns`.
+    chosen : for each column the place of its right channel, see `ForeignData.columns`.
     """
     known = channels(scene)[1:]
     others = tuple(known[column] for column in chosen)

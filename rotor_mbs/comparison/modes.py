@@ -1,4 +1,4 @@
-"""Frequencies of another program over rotor speed against the closed form's; likely causes."""
+"""Compare another program's frequencies over rotor speed with the closed form's; find causes."""
 
 from __future__ import annotations
 
@@ -27,11 +27,12 @@ from rotor_mbs.solution.defects import FLOOR_SAFETY
 from rotor_mbs.solution.trajectory import Array
 from rotor_mbs.studies.modes import compute_modes
 
-# Share of the largest frequency: errors of lower ones are divided by this, not by their own size.
+# The errors of frequencies below this share of the largest frequency are divided by this share of
+# it, not by the frequencies themselves.
 _SLOW = 1e-3
 _MAX_SPEEDS = 1000
-_MIN_TURNING = 3  # speeds above 0: with fewer, any frequency over them is a parabola
-_HZ, _RPM = 2.0 * math.pi, math.pi / 30.0  # rad/s
+_MIN_TURNING = 3  # smallest number of speeds above 0 for a fit: a parabola fits any two of them
+_HZ, _RPM = 2.0 * math.pi, math.pi / 30.0  # one Hz and one rpm in rad/s
 _UNITS = {
     1.0: "",
     _HZ: "Hz taken as rad/s",
@@ -45,8 +46,8 @@ def compare_modes(data: ForeignData, scene: Scene, tolerance: float) -> tuple[Da
     """Compare columns of frequencies with the modes of a scene.
 
     The modes are those of steady rotation without gravity, or those at rest under gravity if no
-    speed is above 0. At each speed, every column is compared with another mode, so that the sum of
-    the differences is least.
+    speed is above 0. At each speed, every column is assigned one mode, and no mode to two columns,
+    with the least sum of the differences.
 
     Parameters
     ----------
@@ -57,13 +58,13 @@ def compare_modes(data: ForeignData, scene: Scene, tolerance: float) -> tuple[Da
     Returns
     -------
     DataVerdict, Record
-        The verdict; and the data with what they were compared with, for a file.
+        The verdict; a record for a file, with the data and the frequencies of the modes.
 
     Raises
     ------
     InputError
-        If there are more than 1000 speeds or more columns than modes, both damped and undamped
-        frequencies, or no modes of the scene.
+        If there are more than 1000 speeds or more columns than modes, if damped and undamped
+        frequencies are mixed, or if the scene has no modes.
     """
     if len(data.time) > _MAX_SPEEDS:
         problem = f"{len(data.time)} speeds; allowed: up to {_MAX_SPEEDS}"
@@ -120,7 +121,8 @@ def _channel_errors(
     Returns
     -------
     tuple of ChannelErrors, str
-        One for each column; what is wrong with the worst of them, "" where none is.
+        The errors of each column; a message on the column with the largest error, or "" if all
+        columns are within the tolerance.
     """
     is_known = np.isfinite(expected).all(axis=1)
     speeds = data.time[is_known]
@@ -162,7 +164,7 @@ def _closed_form_modes(scene: Scene, speeds: Array) -> LinearModes | str:
     Returns
     -------
     LinearModes or str
-        The modes, or why there are none.
+        The modes; or the reason, in words, why there are none.
     """
     if not speeds.any():
         modes = compute_modes(scene, models=(CLOSED_FORM,))
@@ -172,17 +174,18 @@ def _closed_form_modes(scene: Scene, speeds: Array) -> LinearModes | str:
 
 
 def _families(modes: LinearModes, data: ForeignData) -> dict[str, Array]:
-    """Return the families of frequencies that columns may be.
+    """Return the families of frequencies that the data may contain: damped, undamped, whirl.
 
     Parameters
     ----------
     modes : modes of the scene at the speeds of the data.
-    data : the table, whose columns say whether they are damped or undamped frequencies.
+    data : the table, whose columns are named as damped or undamped frequencies.
 
     Returns
     -------
     dict of ndarray
-        By name of the family, "" for the right one, (speeds, frequencies) rad/s.
+        Frequencies, (speeds, frequencies) rad/s, by name of the family. The name of the right
+        family is "".
     """
     damped, undamped = modes.damped_frequencies, modes.undamped_frequencies
     speed = np.abs(modes.speeds[:, None])
@@ -195,7 +198,7 @@ def _families(modes: LinearModes, data: ForeignData) -> dict[str, Array]:
         "rotor's frame"
     )
     in_fixed_frame = right
-    # Of five blades and more some waves have two nodal diameters and more.
+    # If a rotor has five blades or more, some waves have two nodal diameters or more.
     for diameters in range(1, max(2, (modes.blades + 1) // 2)):
         whirling = whirl_frequencies(right, speed, diameters)
         in_fixed_frame = np.concatenate([in_fixed_frame, *whirling], axis=1)
@@ -203,13 +206,13 @@ def _families(modes: LinearModes, data: ForeignData) -> dict[str, Array]:
 
 
 def _frequency_scale(expected: Array) -> Array:
-    """Return the sizes by which errors of frequencies are divided, in the shape of `expected`."""
+    """Return the sizes, rad/s, by which errors of the expected frequencies are divided."""
     least = _SLOW * float(np.nanmax(expected, initial=0.0))
     return np.maximum(expected, least or 1.0)
 
 
 def _errors_of_nearest(values: Array, rounding: Array, known: Array) -> tuple[Array, Array]:
-    """Assign each column another mode at each speed, so that the sum of differences is least.
+    """Assign a different mode to each column at each speed, with the least sum of differences.
 
     Parameters
     ----------
@@ -219,8 +222,8 @@ def _errors_of_nearest(values: Array, rounding: Array, known: Array) -> tuple[Ar
     Returns
     -------
     error, expected : ndarray
-        (speeds, columns) differences beyond rounding, relative to the frequency's size; and rad/s,
-        the frequencies with which the columns are compared.
+        (speeds, columns) both: the differences beyond rounding, divided by `_frequency_scale`; the
+        frequencies of the assigned modes, rad/s.
     """
     expected = np.full(values.shape, np.nan)
     for i, (row, right) in enumerate(zip(values, known, strict=True)):
@@ -236,13 +239,13 @@ def _errors_of_nearest(values: Array, rounding: Array, known: Array) -> tuple[Ar
 
 @dataclass(frozen=True)
 class FrequencyTable:
-    """Frequencies of the data in one reading, and the frequencies that they may be.
+    """Hold the frequencies of the data under a hypothesis, and those of the modes.
 
     Attributes
     ----------
     values, rounding : (speeds, columns) rad/s, and half a unit in their last digits.
-    known : (speeds, modes) rad/s; None if `left` is computed already.
-    left : the largest relative error that is left.
+    known : (speeds, modes) rad/s, frequencies of the modes; None if `left` is computed already.
+    left : the largest relative error that the hypothesis leaves.
     """
 
     values: Array
@@ -252,7 +255,7 @@ class FrequencyTable:
 
 
 def _left(table: FrequencyTable) -> float:
-    """Return the largest error that is left; 0 where there are modes at no speed."""
+    """Return the largest relative error of a table; 0 if no speed has modes."""
     if table.known is None:
         return table.left
     error, _ = _errors_of_nearest(table.values, table.rounding, table.known)
@@ -260,7 +263,9 @@ def _left(table: FrequencyTable) -> float:
 
 
 def _likely_causes(scene: Scene, data: ForeignData, tolerance: float, error: Array) -> list[str]:
-    """Search for the fewest mistakes that explain all columns; several texts if they are alike.
+    """Search for the fewest mistakes that explain all columns.
+
+    Return a text for each explanation with this number of mistakes.
 
     Parameters
     ----------
@@ -276,18 +281,18 @@ def _likely_causes(scene: Scene, data: ForeignData, tolerance: float, error: Arr
 def _hypotheses(
     scene: Scene, data: ForeignData, tolerance: float
 ) -> Iterator[Hypothesis[FrequencyTable]]:
-    """Yield wrong units of frequencies or speeds, other frequencies, missing stiffening.
+    """Yield hypotheses: wrong units of frequencies or speeds, other families, missing stiffening.
 
     Parameters
     ----------
     scene, data, tolerance : see `compare_modes`.
     """
-    # Stiffening is the change from rest on: the squares of undamped frequencies are needed there
-    # and at the speeds of the data.
+    # Stiffening is the change of frequencies from rest to a speed. The undamped frequencies are
+    # needed at rest and at the speeds of the data.
     from_rest: LinearModes | str = ""
     if np.count_nonzero(data.time) >= _MIN_TURNING:
         from_rest = _closed_form_modes(scene, np.union1d(0.0, data.time))
-    units_of_speed = _UNITS if data.time.any() else {1.0: ""}  # 0 is 0 in any unit
+    units_of_speed = _UNITS if data.time.any() else {1.0: ""}  # a speed of 0 has no unit
     for speed_factor, of_speeds in units_of_speed.items():
         modes = _closed_form_modes(scene, speed_factor * data.time)
         if isinstance(modes, str):
@@ -318,30 +323,32 @@ def _hypotheses(
 def _without_stiffening(
     modes: LinearModes, speeds: Array, values: Array, rounding: Array
 ) -> tuple[float, str]:
-    """Fit f² = f0² - α Ω² to columns of frequencies, with f0 of the scene and α >= 0.
+    """Fit f² = f0² - α Ω² to columns of frequencies, with f0 of the scene at rest and α >= 0.
 
-    Of a blade that turns about its pitch axis by θ, the centrifugal forces have the stiffness
-    Ω² Σ m (u² - v²), u the distance of its masses from that axis across the shaft, v along it. A
-    model of linear displacements has none of u², which is of second order in θ: what is left,
-    -Ω² Σ m v², softens. It can be missing only where the scene's own f² rises, or falls less.
+    If a blade turns about its pitch axis by θ, the stiffness of the centrifugal forces is
+    Ω² Σ m (u² - v²). Here u and v are the distances of a mass m from the pitch axis, u across the
+    shaft and v along it. The term u² comes from displacements of second order in θ, which a model
+    of linear displacements does not have. The rest, -Ω² Σ m v², softens. A frequency is fitted only
+    if f² of the scene rises with the speed, or falls less than the fitted f².
 
     Parameters
     ----------
-    modes : modes of the scene, first at rest, then at the speeds.
-    speeds : (n,) rad/s, without rest.
-    values, rounding : (n, columns) rad/s, the columns that are wrong.
+    modes : modes of the scene at rest and at the speeds, in this order.
+    speeds : (n,) rad/s, increasing; the last is above 0.
+    values, rounding : (n, columns) rad/s, frequencies of the columns that are wrong, and half a
+        unit in their last digits.
 
     Returns
     -------
     float, str
-        What is left of the largest error; the cause in words.
+        The largest relative error that the fit leaves; the cause in words.
     """
     squares, squared_speeds = modes.undamped_frequencies**2, speeds**2
     largest, alphas = 0.0, []
     for column, column_rounding in zip(values.T, rounding.T, strict=True):
         fits = []
         for at_rest, at_end in zip(squares[0], squares[-1], strict=True):
-            # Least squares with one unknown; a negative α would be no missing stiffening.
+            # Least squares with the one unknown α. A negative α would be additional stiffening.
             slope = squared_speeds @ (at_rest - column**2) / (squared_speeds @ squared_speeds)
             alpha = max(float(slope), 0.0)
             if not at_end > at_rest - alpha * squared_speeds[-1]:
