@@ -21,15 +21,15 @@ def assert_agrees(
 ) -> DataComparison:
     """Raise AssertionError if a trajectory does not agree with the reference of a scene.
 
-    Its message is the table of the comparison.
+    The message of the error is the text of the comparison, with its table.
 
     Parameters
     ----------
-    time : (n,) s, increasing; any times within the scene's duration, including its start and end.
+    time : (n,) s, increasing, from the start to the end of the scene, with any spacing.
     angles : (n, 1 + blades) rad: rotor, then the pitch of each blade, unwrapped.
     scene : the name of a shipped scene, a TOML file, or a `Scene`.
     rates : (n, 1 + blades) rad/s; optional.
-    tolerance : bound on interval defects, and on errors divided by the error growth (rad).
+    tolerance : bound (rad) on interval defects, and on errors divided by the error growth.
 
     Returns
     -------
@@ -41,7 +41,7 @@ def assert_agrees(
         For arrays that cannot be compared: other shapes, times that do not increase, numbers that
         are not finite.
     TypeError
-        If `scene` is neither a scene nor text nor a path, or the tolerance no number.
+        If `scene` is neither a scene nor text nor a path, or `tolerance` is not a number.
 
     Examples
     --------

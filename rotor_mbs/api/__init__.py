@@ -1,6 +1,7 @@
-"""Define the Python API, `import rotor_mbs as rm`, on the studies that the command line runs.
+"""Define the Python API, `import rotor_mbs as rm`.
 
-Prints nothing. A wrong value raises `rotor_mbs.errors.InputError`, an unreadable or foreign file
-`StoreError`, an argument of a wrong type `TypeError`. Matplotlib, the templates of pages, xarray
-and pandas are loaded when a picture, a page or such a table is asked for.
+The functions call the same studies as the command line. They print nothing except the progress of
+long calls. A wrong value raises `rotor_mbs.errors.InputError`, a file that cannot be read or is not
+of this program raises `StoreError`, and an argument of a wrong type raises `TypeError`. Matplotlib,
+the templates of pages, xarray and pandas are loaded when they are first needed.
 """

@@ -36,15 +36,15 @@ def bench(
 ) -> BenchCurves:
     """Measure the error of methods against their run time, over a ladder of settings.
 
-    The ladder of a method has several time steps or tolerances.
+    A ladder is a list of time steps or tolerances, from coarse to fine.
 
     Parameters
     ----------
     scene : a Scene, the name of a shipped scene, or a TOML file.
-    methods : names of methods, or paths of Python files; by default all that have a ladder.
-    output : file of the curves; those that it already has are not measured again. Default: a
+    methods : names of methods, or paths of Python files; by default all methods with a ladder.
+    output : file for the curves; curves that it already has are not measured again. By default a
         temporary file, which is removed with the last object that refers to it.
-    repeats : largest number of timed runs of each point; 1 or more.
+    repeats : largest number of timed runs of a method at one setting; 1 or more.
     budget : time for all curves (s).
     progress : whether to show the progress. By default on a terminal and in a notebook.
 
@@ -61,8 +61,8 @@ def bench(
     TypeError
         For an argument of a wrong type.
     ResourceError
-        If the process that measured curves died or could not be started; the others are stored in
-        `output`.
+        If the process that measures curves died or could not be started; the other curves are
+        stored in `output`.
 
     Examples
     --------
@@ -108,9 +108,9 @@ def bench(
 class BenchCurves(Mapping[str, Mapping[str, Any]]):
     """Curves of error against run time: a mapping from "scene/curve" to its arrays.
 
-    They are in a file of `rotor-mbs bench`. An array has one value per setting:
-    `curves["paper/fig11/exudyn_tree/rk67"]["angle_error_max"]` (rad), `["run_time_s"]` (s),
-    `["setting"]`: a time step in s or a tolerance.
+    The curves are read from a file that `rm.bench` or `rotor-mbs bench` wrote. An array has one
+    value per setting: `curves["paper/fig11/exudyn_tree/rk67"]["angle_error_max"]` (rad),
+    `["run_time_s"]` (s), `["setting"]`: a time step in s or a tolerance.
     """
 
     def __init__(self, path: Path, *, _folder: TemporaryFolder | None = None) -> None:
@@ -132,8 +132,9 @@ class BenchCurves(Mapping[str, Mapping[str, Any]]):
     def table(self) -> Any:
         """Return a pandas DataFrame with a row per point: a curve at one of its settings.
 
-        It has every number that is stored of a point, and its status; `table.attrs["run_time_s"]`
-        are the attributes of a column: `units` and `long_name`.
+        The columns are the curve, the status, and every number that is stored for a point.
+        `table.attrs["run_time_s"]` has the unit and the name of the column "run_time_s": `units`
+        and `long_name`.
         """
         values: dict[str, list[Any]] = {"curve": [], "status": [], "message": []}
         for label, record in self._records.items():
@@ -146,7 +147,7 @@ class BenchCurves(Mapping[str, Mapping[str, Any]]):
         return data_frame(values, COLUMNS)
 
     def to_html(self, folder: str | os.PathLike[str]) -> Path:
-        """Write the page into a folder, and return its path."""
+        """Write the pages on the curves into a folder, and return the path of the index."""
         from rotor_mbs.report.build import write_report  # late: templates
 
         return write_report(self.path, file_path(folder))
@@ -158,10 +159,10 @@ class BenchCurves(Mapping[str, Mapping[str, Any]]):
         return f"<p>{escape(self._headline())}</p>{self._summary()._repr_html_()}"
 
     def _summary(self) -> TextTable:
-        """Return a row per curve: its smallest error, and the run times at which errors are met."""
+        """Return a table with a row per curve: its smallest error, run times to given errors."""
         return bench_table(list(self._records.values()))
 
     def _headline(self) -> str:
-        """Return the number of curves, after the path of the file unless it is temporary."""
+        """Return a heading: the path of the file unless it is temporary, the number of curves."""
         place = f"{self.path}: " if self._folder is None else ""
         return f"{place}{counted(len(self), 'curve')} of error against run time"

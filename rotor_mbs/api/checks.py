@@ -31,14 +31,14 @@ _COLUMNS = (
 
 
 class Checks(Sequence[Check]):
-    """A sequence of checks, each a number against its bound.
+    """A sequence of checks, each of which compares a number with a bound.
 
-    Its text has a table of those that failed, and the counts.
+    It prints as a table of the failed checks, and the numbers of passed and failed checks.
 
     Attributes
     ----------
-    passed : whether all passed.
-    failures : those that did not.
+    passed : whether all checks passed.
+    failures : the checks that failed.
     """
 
     def __init__(self, checks: Iterable[Check]) -> None:
@@ -51,7 +51,7 @@ class Checks(Sequence[Check]):
 
     @property
     def failures(self) -> tuple[Check, ...]:
-        """Return the checks that did not pass."""
+        """Return the checks that failed."""
         return tuple(check for check in self._checks if not check.passed)
 
     @overload
@@ -67,8 +67,8 @@ class Checks(Sequence[Check]):
     def table(self) -> Any:
         """Return a pandas DataFrame with a row per check.
 
-        It has what was checked, in which run, whether it passed, value, bound, their unit, and the
-        probable reason of a failure.
+        The columns are the name of the check, scene, method and channel, whether the check passed,
+        value and bound with their unit, and the probable reason of a failure.
         """
         values: dict[str, list[Any]] = {name: [] for name in _COLUMNS}
         for check in self._checks:
@@ -110,16 +110,16 @@ def check(
 
     Parameters
     ----------
-    path : the file.
-    bounds : TOML file of bounds that are added to the shipped ones.
-    require : methods of which every scene is to have a run.
+    path : the results file or the file of a sweep.
+    bounds : TOML file of bounds that are added to the shipped bounds.
+    require : names of methods; a check fails if a scene has no run of such a method.
 
     Raises
     ------
     InputError
-        For a file without a run of a method, and for bounds that are none.
+        If the file has no runs to check, or `bounds` is not a valid file of bounds.
     StoreError
-        If the file cannot be read or is not of this program.
+        If the results file cannot be read or is not of this program.
     TypeError
         For an argument of a wrong type.
 
@@ -148,13 +148,13 @@ def test_method(name: str | os.PathLike[str], *, timeout: float = 60.0) -> Check
 
     Parameters
     ----------
-    name : a method, or the path of a Python file with methods of one's own; docs/your-engine.md.
+    name : name of a method, or path of a Python file with your own methods (docs/your-engine.md).
     timeout : time limit of each run (s).
 
     Raises
     ------
     InputError
-        For an unknown method, or a file that has none.
+        For an unknown method, or a Python file without a method.
     TypeError
         For an argument of a wrong type.
 
@@ -172,4 +172,4 @@ def test_method(name: str | os.PathLike[str], *, timeout: float = 60.0) -> Check
     )
 
 
-test_method.__test__ = False  # type: ignore[attr-defined]  # of pytest, where it is imported
+test_method.__test__ = False  # type: ignore[attr-defined]  # pytest must not collect it

@@ -47,9 +47,9 @@ def compare(
 ) -> DataComparison:
     """Compare a trajectory, loads or modes of another program with a scene.
 
-    A trajectory is compared with the reference at the times of the data, loads with those of the
-    closed form at the states of the data, and a table of modes with the frequencies of the closed
-    form.
+    A trajectory is compared with the reference at the times of the data. Loads are compared with
+    the loads of the closed form at the states of the data. A table of modes is compared with the
+    frequencies of the closed form.
 
     Parameters
     ----------
@@ -60,21 +60,21 @@ def compare(
         rad/s.
     scene : a Scene, the name of a shipped scene, or a TOML file.
     columns : a mapping file, or a mapping with the same keys: column, unit, sign, offset of each
-        channel, and whether it is wrapped. By default columns are identified by name, see
-        `verdict.read`.
-    tolerance : bound on interval defects beyond rounding of the data (rad); relative bound on loads
-        and frequencies.
+        channel, and whether it is wrapped. By default columns are identified by their names;
+        `verdict.read` of the result lists them.
+    tolerance : bound on interval defects, beyond what the rounding of the data explains (rad);
+        relative bound on loads and frequencies.
     timeout : time limit for the reference, the defects and the search for causes (s).
     progress : whether to show the progress. By default on a terminal and in a notebook.
 
     Raises
     ------
     InputError
-        For data that cannot be read or compared, in one line with file, column or row, and what is
-        allowed; or if the reference takes longer than the time limit.
+        If the data cannot be read or compared; the message is one line with file, column or row,
+        and what is allowed. Also if the reference and the defects take longer than the time limit.
     TypeError
-        If `data` or `columns` is neither a mapping nor text nor a path, `scene` neither a scene nor
-        text nor a path, or a limit or a tolerance no number.
+        If `data` or `columns` is neither a mapping nor text nor a path, if `scene` is neither a
+        scene nor text nor a path, or if `timeout` or `tolerance` is not a number.
 
     Examples
     --------
@@ -105,9 +105,9 @@ def compare(
 
 
 def open_comparisons(path: Path) -> DataComparison | dict[str, DataComparison]:
-    """Return the comparison in a file, or a dict by "scene/name" if it has several.
+    """Return the comparison in a file, or a dict by "scene/name" if the file has several.
 
-    Raises StoreError if the file has none or cannot be read.
+    Raises StoreError if the file has no comparison or cannot be read.
     """
     comparisons = {}
     for record in read_records(path, COMPARISON):
@@ -123,14 +123,15 @@ def open_comparisons(path: Path) -> DataComparison | dict[str, DataComparison]:
 
 @dataclass(repr=False)
 class DataComparison:
-    """Result of `rotor_mbs.compare`. Prints as a table.
+    """Result of `rotor_mbs.compare`; it prints as a table.
 
     Attributes
     ----------
     verdict : errors and verdict, see `rotor_mbs.comparison.verdict.DataVerdict`.
     record : data, reference, errors and defects, as `save` stores them.
-    status, message, agrees : status, the reason if it is not "ok", and whether it is "ok".
-    likely : probable causes of a difference.
+    status, message : "ok" or another status; the reason if the status is not "ok".
+    agrees : whether the status is "ok".
+    likely : probable causes of a difference, in words.
     """
 
     verdict: DataVerdict
@@ -143,10 +144,11 @@ class DataComparison:
     def table(self) -> Any:
         """Return a pandas DataFrame with a row per channel.
 
-        Columns: the largest error up to the horizon and over all rows, in `unit`; the largest
-        defect beyond what the digits of the data explain (`defect`), and what they explain
-        (`floor`), in `defect_unit`; and for each of several levels the time (s) up to which the
-        errors stay within it.
+        `error_max` and `error_whole` are the largest errors up to the horizon and over all rows, in
+        `unit`. `defect` is the largest defect beyond the rounding of the data, and `floor` the
+        largest defect that this rounding explains, both in `defect_unit`. The other columns have,
+        for each of several levels, the time (s) up to which the errors stay within the level; for
+        modes the speed (rad/s).
         """
         rows = []
         for channel in self.verdict.channels:
@@ -159,7 +161,7 @@ class DataComparison:
     def plot(self) -> Panels:
         """Plot the defects of each coordinate over time with the tolerance.
 
-        Errors are plotted where there are no defects.
+        If the data have no defects, for example in a table of modes, plot the errors.
         """
         # late: matplotlib
         from rotor_mbs.report.pages.comparison import defect_panels, error_panels
@@ -167,10 +169,11 @@ class DataComparison:
         return (defect_panels(self.record) or error_panels(self.record)).with_legend()
 
     def to_xarray(self) -> Any:
-        """Return data, reference, errors and defects as an xarray.Dataset over time.
+        """Return data, reference, errors and defects as an xarray.Dataset over time or speed.
 
-        Variables by channel, with units: data `pitch_1`, then `pitch_1_reference`, `pitch_1_error`,
-        and `pitch_1_defect` of the interval before each row (rad).
+        The variables of a channel have its name: data `pitch_1`, then `pitch_1_reference`,
+        `pitch_1_error`, and for angles and rates `pitch_1_defect` (rad), the defect of the interval
+        before each row. Variables have units.
         """
         import xarray  # late: 0.4 s
 
@@ -189,24 +192,25 @@ class DataComparison:
         return xarray.Dataset(variables, attrs={"scene": record.scene} | facts)
 
     def to_html(self, folder: str | os.PathLike[str]) -> Path:
-        """Write the page into a folder, and return its path."""
+        """Write the page on the comparison into a folder, and return the path of the page."""
         from rotor_mbs.report.files import write_page  # late: templates
         from rotor_mbs.report.pages.comparison import comparison_page
 
         return write_page(file_path(folder), comparison_page(self.record), versions() | machine())
 
     def save(self, path: str | os.PathLike[str]) -> Path:
-        """Save data, reference, errors and verdict as a results file.
+        """Save data, reference, errors and verdict in a file that `rotor-mbs report` reads.
 
-        An earlier comparison is replaced. Raises InputError for other files, StoreError if it
-        cannot be written, TypeError if `path` is neither text nor a path.
+        An earlier comparison of the same scene and kind (trajectory or modes) is replaced; other
+        comparisons in the file are kept. Raises InputError if `path` is a file of another kind,
+        StoreError if it cannot be read or written, TypeError if `path` is neither text nor a path.
         """
         target = file_path(path)
         write_records(target, [self.record])
         return target
 
     def __repr__(self) -> str:
-        """Return how columns were read, the numbers by channel, and the verdict, as text."""
+        """Return a text: how columns were read, the numbers of each channel, and the verdict."""
         verdict = self.verdict
         lines = [
             (

@@ -16,22 +16,23 @@ def open(path: str | os.PathLike[str]) -> Any:
 
     Parameters
     ----------
-    path : of the file.
+    path : path of the file.
 
     Returns
     -------
     Results
         For a results file or a sweep. The labels of a file with one scene are method names.
-    Modes, DataComparison
-        For a file of modes, or of comparisons; if it has several, a dict by scene, or by scene and
-        name.
+    Modes
+        For a file of modes; a dict by scene name if the file has several scenes.
+    DataComparison
+        For a file of a comparison; a dict by "scene/name" if the file has several comparisons.
     BenchCurves
-        For a results file that has no runs but the curves of `rotor-mbs bench`.
+        For a results file with the curves of `rotor-mbs bench`, but without runs.
 
     Raises
     ------
     StoreError
-        For any other file, and one that is damaged.
+        For any other file, and for a damaged file.
     TypeError
         If `path` is neither text nor a path.
 
@@ -45,7 +46,7 @@ def open(path: str | os.PathLike[str]) -> Any:
     """
     file = file_path(path)
     kind = read_trailer(file).kind
-    # Each kind loads what it needs: modes need SciPy, and runs do not.
+    # A module is imported only for its kind of file: modes need SciPy, and runs do not.
     if kind == MODES:
         from rotor_mbs.api.modes import open_modes
 

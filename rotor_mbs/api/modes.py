@@ -39,12 +39,13 @@ def modes(scene: Scene | str | os.PathLike[str], speeds: Sequence[float] = ()) -
 
     Every model that can be linearized computes the modes at rest under gravity, and over `speeds`
     in steady rotation without gravity (Campbell diagram). Floquet multipliers are computed in
-    rotation under gravity. The scene's torque is not included: a drive torque maintains the speed.
+    rotation under gravity. A drive torque that maintains the speed takes the place of the scene's
+    torque.
 
     Parameters
     ----------
     scene : a Scene, the name of a shipped scene, or a TOML file.
-    speeds : rotor speeds (rad/s), increasing; below 0 the rotor turns the other way.
+    speeds : rotor speeds (rad/s), increasing; at a negative speed the rotor turns the other way.
 
     Returns
     -------
@@ -55,7 +56,7 @@ def modes(scene: Scene | str | os.PathLike[str], speeds: Sequence[float] = ()) -
     InputError
         For speeds that do not increase, and for a scene without a steady state.
     TypeError
-        If `scene` is neither a scene nor text nor a path, or a speed is no number.
+        If `scene` is neither a scene nor text nor a path, or a speed is not a number.
 
     Examples
     --------
@@ -72,7 +73,7 @@ def modes(scene: Scene | str | os.PathLike[str], speeds: Sequence[float] = ()) -
 
 
 def open_modes(path: Path) -> Modes | dict[str, Modes]:
-    """Return the modes in a file, or a dict by scene if it has several scenes.
+    """Return the modes in a file, or a dict by scene name if the file has several scenes.
 
     Raises StoreError if the file cannot be read.
     """
@@ -87,21 +88,23 @@ class Modes(SceneModes):
     Attributes
     ----------
     rest, rotation : modes by model, at rest under gravity, and over speed without gravity; the
-        closed form first. `fixed_frame` of one has names and frequencies (rad/s) of collective
-        mode, backward and forward whirl in both frames, or is a text that says why there are none.
-    floquet : Floquet multipliers under gravity; None if not computed.
+        closed form first. `modes.rotation["lagrange"].fixed_frame` has names and frequencies
+        (rad/s) of the rotor's motions in both frames, such as backward and forward whirl. It is a
+        text with the reason if no whirl is defined.
+    floquet : Floquet multipliers under gravity; None if they were not computed.
     notes : results that could not be computed, with the reason.
-    agrees, disagreement : whether the modes of the models agree and satisfy their own equations,
-        and the largest difference of a frequency or a decay rate, relative to the largest
-        eigenvalue.
-    residuals, faults : by model, the residuals of its modes in its own linearized equations; a line
-        for each that is too large.
-    plot : `modes.plot()` draws the Campbell diagram; `.damping()`, `.multipliers()`.
+    agrees : whether the modes of all models agree and satisfy the equations of their own models.
+    disagreement : largest difference of a frequency or a decay rate between models, relative to the
+        largest eigenvalue.
+    residuals : by model, the largest residual of its modes in its own linearized equations.
+    faults : a line for each residual that is too large.
+    plot : `modes.plot()` draws the Campbell diagram, `modes.plot.damping()` the damping ratios, and
+        `modes.plot.multipliers()` the Floquet multipliers.
     """
 
     @property
     def plot(self) -> ModePlots:
-        """Return the plots of the modes; called, it draws the Campbell diagram."""
+        """Return the plots of the modes; `modes.plot()` draws the Campbell diagram."""
         from rotor_mbs.report.pages.modes import ModePlots  # late: matplotlib
 
         return ModePlots(self)
@@ -109,31 +112,35 @@ class Modes(SceneModes):
     def table(self) -> Any:
         """Return a pandas DataFrame with a row per state, speed and mode of the closed form.
 
-        Frequencies are in rad/s, decay rates in 1/s; damping ratios have no unit. The whirl's are
-        those in the fixed frame, all others in the rotating frame; `table.attrs["growth_rate"]` are
-        the attributes of a column. See `campbell` for Hz over rpm.
+        Frequencies are in rad/s, growth rates in 1/s; damping ratios have no unit. Whirl
+        frequencies are those in the fixed frame, all other frequencies those in the rotating frame.
+        `table.attrs["growth_rate"]` has the unit and the name of the column "growth_rate". See
+        `campbell` for frequencies in Hz over rpm.
         """
         rows = mode_rows(self)
         names = list(rows[0]) if rows else []
         return data_frame({name: [row[name] for row in rows] for name in names}, MODE_COLUMNS)
 
     def campbell(self) -> TextTable:
-        """Return frequencies in Hz over the rotor speed in rpm, by the closed form.
+        """Return a table of the closed form's frequencies in Hz over the rotor speed in rpm.
 
-        They are those in the rotating and in the fixed frame, the latter also as multiples of the
-        rotor speed; where no whirl is defined, those in the rotating frame.
+        The table has the frequencies in the rotating and in the fixed frame; those in the fixed
+        frame also as multiples of the rotor speed. If no whirl is defined, the table has only the
+        rotating frame, with these multiples.
 
         Raises
         ------
         InputError
-            Where no modes over speed were computed.
+            If no modes over speed were computed.
         """
         for linear in self.rotation.values():
             return campbell_table(linear)
         raise InputError(f"{self.scene}: no modes over speed; allowed: modes computed with speeds")
 
     def to_xarray(self, state: str = "rotation") -> Any:
-        """Return the modes of one state as an xarray.Dataset; its dimension `solver` is the model.
+        """Return the modes of one state by all models as an xarray.Dataset.
+
+        The dimension `solver` is the model.
 
         Parameters
         ----------
@@ -142,7 +149,7 @@ class Modes(SceneModes):
         Raises
         ------
         InputError
-            For another state, and one that was not computed.
+            For any other text, and for a state that was not computed.
         """
         states = {"rotation": self.rotation, "rest": self.rest}
         if state not in states:
@@ -154,15 +161,16 @@ class Modes(SceneModes):
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Save the modes in a file that `rotor-mbs report` reads.
 
-        A file of modes is replaced. Raises InputError for other files, TypeError if `path` is
-        neither text nor a path.
+        In an existing file of modes, earlier modes of the same scene are replaced, and those of
+        other scenes are kept. Raises InputError if `path` is a file of another kind, StoreError if
+        it cannot be read or written, TypeError if `path` is neither text nor a path.
         """
         target = file_path(path)
         write_records(target, to_records(self))
         return target
 
     def to_html(self, folder: str | os.PathLike[str]) -> Path:
-        """Write the page into a folder, and return its path."""
+        """Write the page on the modes into a folder, and return the path of the page."""
         from rotor_mbs.report.files import write_page  # late: templates
         from rotor_mbs.report.pages.modes import modes_page
 

@@ -1,4 +1,4 @@
-"""Hold runs in Python: `Run`, and `Results`, what several methods, a sweep or a file give."""
+"""Hold runs in Python: `Run` for one run, `Results` for those of methods, a sweep or a file."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ if TYPE_CHECKING:
     from rotor_mbs.report.plots import ComparisonPlots, RunPlots
 
 
-# Columns with a number or a text of each run.
+# Dimensions of the columns that have one number or one text for each run.
 _OF_A_RUN = (("run",), ("run", CHARACTERS))
 _JSON = ("settings", "options", "versions", "scene_hash")
 
@@ -59,14 +59,14 @@ _JSON = ("settings", "options", "versions", "scene_hash")
 class Run(Solution):
     """A run: a scene simulated with one method.
 
-    In addition to the members of `Solution` (`time`, `angles`, `rates`, `run["tip"]`, `status`,
-    `message`, `metrics`, `settings`, `to_xarray()`):
+    It has the members of `Solution` (`time`, `angles`, `rates`, `run["tip"]`, `status`, `message`,
+    `metrics`, `settings`, `to_xarray()`), and:
 
     Attributes
     ----------
-    reference : the reference trajectory; None without a reference.
-    plot : `run.plot()` draws the motion; `run.plot.energy()`, `.error()`, `.tips()`,
-        `.loads("shaft_force")`.
+    reference : the reference trajectory; None if there is no reference.
+    plot : `run.plot()` draws the motion. Other plots are `run.plot.energy()`, `.error()`,
+        `.tips()`, `.loads("shaft_force")`.
     """
 
     reference: Trajectory | None = None
@@ -89,7 +89,7 @@ class Run(Solution):
 
     @property
     def plot(self) -> RunPlots:
-        """Return the plots of the run; called, it draws the motion."""
+        """Return the plots of the run; `run.plot()` draws the motion."""
         from rotor_mbs.report.plots import RunPlots  # late: matplotlib
 
         return RunPlots(self, self.reference)
@@ -122,7 +122,7 @@ class Run(Solution):
     def _repr_html_(self) -> str:
         """Return a summary of the run with all metrics and a drawing, for a notebook."""
         drawn = ""
-        with suppress(InputError):  # without samples, or without angles and rates
+        with suppress(InputError):  # no plot without samples, or without angles and rates
             drawn = self.plot()._repr_svg_()
         cells = ""
         for name, text in self._metrics_shown().items():
@@ -147,10 +147,10 @@ class TemporaryFolder:
 class Results(Mapping[Any, Any]):
     """A mapping from label to `Run`, for the runs of a file; a run is read on access.
 
-    What `rm.run` of several methods and `rm.sweep` return, and what `rm.open` returns for the files
-    that they, or the commands, have written: with the same labels. These are method names (and
-    "reference") for one scene, "paper/fig11/lagrange/taylor" for a file with several scenes, and
-    run numbers for a sweep. `results["paper/fig11"]` has the runs of one scene of a file.
+    `rm.run` with several methods and `rm.sweep` return such a mapping, and `rm.open` returns it for
+    a stored results file or sweep. Labels are method names (and "reference") for one scene,
+    "paper/fig11/lagrange/taylor" for a file with several scenes, and run numbers for a sweep. In a
+    file with several scenes, `results["paper/fig11"]` has the runs of one scene.
 
     Parameters
     ----------
@@ -162,7 +162,7 @@ class Results(Mapping[Any, Any]):
     Attributes
     ----------
     plot : plots of the runs of one scene: `results.plot.error()`, `.rotor()`, `.energy_error()`.
-    scenes : names of the scenes in the order of the file; of a sweep, of the scene that is varied.
+    scenes : names of the scenes, sorted; for a sweep, the name of the scene that is varied.
     statuses : number of stored runs with each status.
     """
 
@@ -178,7 +178,7 @@ class Results(Mapping[Any, Any]):
         Parameters
         ----------
         path, scene : see the class.
-        _folder : the temporary folder of the file, which is kept as long as these runs.
+        _folder : the temporary folder of the file; it exists at least as long as this object.
 
         Raises
         ------
@@ -197,7 +197,8 @@ class Results(Mapping[Any, Any]):
     def __reduce__(self) -> tuple[Any, ...]:
         """Return the arguments of `_restored`, for a copy or a pickle.
 
-        The content of a temporary file is among them, so that the copy has a file of its own.
+        The content of a temporary file is one of the arguments, so that the copy has a file of its
+        own.
         """
         content = None if self._folder is None else self.path.read_bytes()
         return _restored, (self.path, self.scene, content)
@@ -207,16 +208,17 @@ class Results(Mapping[Any, Any]):
 
         Parameters
         ----------
-        label : see the class; of one scene also with the name of the scene before the method.
+        label : see the class. For the runs of one scene, the name of the scene may precede the
+            method.
 
         Raises
         ------
         KeyError
             If the file has no such run.
         StoreError
-            If its samples cannot be read.
+            If the samples of the run cannot be read.
         """
-        # "paper/fig11/lagrange/taylor", as in a file of several scenes
+        # Accept "paper/fig11/lagrange/taylor" also in a file of one scene.
         if self.scene and isinstance(label, str):
             label = label.removeprefix(f"{self.scene}/")
         if label not in self._labels:
@@ -247,9 +249,9 @@ class Results(Mapping[Any, Any]):
     def table(self) -> Any:
         """Return a pandas DataFrame with a row per run, by label.
 
-        It has every number and text that is stored of a run: varied parameters, status, metrics,
-        times, settings, versions. `table.attrs["defect_max"]` are the attributes of a column:
-        `units` and `long_name`, which names what is stored.
+        The columns are all numbers and texts that are stored for a run: varied parameters, status,
+        metrics, times, settings, versions. `table.attrs["defect_max"]` has the unit and a
+        description of the column "defect_max": `units` and `long_name`.
 
         Raises
         ------
@@ -260,18 +262,18 @@ class Results(Mapping[Any, Any]):
         with reading(self.path):
             values: dict[str, Any] = {}
             about: dict[str, Column] = {}
-            # JSON texts, which are long, stand at the end.
+            # Long texts, such as JSON, are the last columns.
             for name, column in sorted(self._stored.columns.items(), key=lambda c: c[0] in _JSON):
                 if name not in ("run", "crc32") and column.dimensions in _OF_A_RUN:
-                    shown = "method_name" if name == "method_code" else name  # codes are texts here
+                    shown = "method_name" if name == "method_code" else name  # names, not codes
                     values[shown], about[shown] = self._values(name), column
             return data_frame(values, about, list(self._labels))
 
     def column(self, name: str) -> Any:
-        """Return an array of all runs, (runs, ...), such as "status", "pitch_max" or "angles".
+        """Return a stored quantity of all runs, (runs, ...): "status", "pitch_max", "angles", ...
 
-        Arrays over time are there for one scene and for a sweep. Raises StoreError if the file has
-        no such array.
+        Quantities over time are available for one scene and for a sweep. Raises StoreError if the
+        file has no such quantity.
         """
         if name not in self._stored.columns:
             raise self._missing(name)
@@ -279,9 +281,10 @@ class Results(Mapping[Any, Any]):
         return self._stored.values(name)
 
     def at(self, name: str, sample: int) -> Any:
-        """Return an array over time, such as "angles", at one sample of all runs.
+        """Return a quantity over time, such as "angles", at one sample of all runs, (runs, ...).
 
-        Raises StoreError for another quantity or sample, TypeError if `sample` is no whole number.
+        Raises StoreError if the file has no such quantity or sample, TypeError if `sample` is not a
+        whole number.
         """
         sample, columns = operator.index(sample), self._stored.columns
         if name not in columns:
@@ -294,12 +297,12 @@ class Results(Mapping[Any, Any]):
         return self._stored.values(name, sample)
 
     def _missing(self, name: str) -> StoreError:
-        """Return the error of a column that the file does not have."""
+        """Return the error to raise for a column that the file does not have."""
         allowed = ", ".join(self._stored.columns)
         return StoreError(f"{self.path}: has no {shown_value(name)}; allowed: {allowed}")
 
     def _values(self, name: str) -> list[Any] | NDArray[Any]:
-        """Return a column of all runs, whose texts and codes are texts."""
+        """Return a column of all runs, with stored characters and codes decoded as texts."""
         values, column = self._stored.values(name), self._stored.columns[name]
         if values.ndim == 2:
             return [text_of(characters) for characters in values]
@@ -309,7 +312,7 @@ class Results(Mapping[Any, Any]):
     def plot(self) -> ComparisonPlots:
         """Return the plots of the runs of one scene.
 
-        Raises InputError for the runs of several scenes and of a sweep.
+        Raises InputError if these are the runs of several scenes or of a sweep.
         """
         from rotor_mbs.report.plots import ComparisonPlots  # late: matplotlib
 
@@ -333,18 +336,19 @@ class Results(Mapping[Any, Any]):
         Returns
         -------
         xarray.Dataset
-            For one scene or a sweep (opened lazily), with the dimension `run`; statuses are texts.
-            Select by label: `data.angles.sel(run="lagrange/taylor", coordinate="pitch 1")`,
+            For one scene, or for a sweep, which is opened lazily. It has the dimension `run`;
+            statuses are texts. Select by label, for example
+            `data.angles.sel(run="lagrange/taylor", coordinate="pitch 1")` or
             `data.tip.sel(blade=1, axis="y")`.
         xarray.DataTree
-            For a file with several scenes, opened lazily.
+            For a file with several scenes, which is opened lazily.
 
         Raises
         ------
         StoreError
             If a run is damaged.
         InputError
-            If what is no grid of varied parameters is to be unstacked.
+            If `unstack` is true and the runs are not a grid of varied parameters.
         """
         import xarray  # late: 0.4 s
 
@@ -354,7 +358,7 @@ class Results(Mapping[Any, Any]):
         if self._stored.group is None:
             return xarray.open_datatree(self.path)
         data = xarray.open_dataset(self.path, group=self._stored.group or None)
-        if self.scene:  # of a file that another call may replace
+        if self.scene:  # load it now: another call may replace the file
             with data:
                 data = data.load()
         data = _labelled(data)
@@ -363,9 +367,9 @@ class Results(Mapping[Any, Any]):
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Save a copy of the file, which `rotor-mbs report` and `rotor_mbs.open` read.
 
-        An earlier copy is replaced if no run in it is lost. Raises InputError for files with other
-        runs or of another kind, StoreError for files that are damaged or not of this program,
-        TypeError if `path` is neither text nor a path.
+        A file at `path` is replaced if none of its runs is lost. Raises InputError if that file has
+        other runs or is of another kind, StoreError if it is damaged, not of this program, or
+        cannot be written, TypeError if `path` is neither text nor a path.
         """
         target = file_path(path)
         copy_file(self.path, target)
@@ -382,22 +386,24 @@ class Results(Mapping[Any, Any]):
 
     def _repr_html_(self) -> str:
         drawn = ""
-        with suppress(InputError):  # of several scenes, without a reference or without angles
+        # There is no plot for several scenes, without a reference or without angles.
+        with suppress(InputError):
             drawn = self.plot.error()._repr_svg_()
         return f"<p>{escape(self._headline())}</p>{self._short_table()._repr_html_()}{drawn}"
 
     def _headline(self) -> str:
         counts = ", ".join(f"{count} {status}" for status, count in self.statuses.items())
-        # a temporary file's path says nothing
+        # The path of a temporary file tells a user nothing.
         place = self._stored.title if self.scene or self._folder is not None else self.path
         # "changed: duration: 5 runs" would read as a duration of 5
         separator = "; " if ": " in str(place) else ": "
         return f"{place}{separator}{counted(len(self), 'run')}: {counts}"
 
     def _short_table(self) -> TextTable:
-        """Return a table for a screen.
+        """Return a short table for a screen.
 
-        It has a row per run, with many runs per method, for a sweep the varied parameters.
+        It has a row per run, or a row per method if there are many runs. For a sweep it has the
+        varied parameters.
         """
         if isinstance(self._stored, StoredSweep):
             return sweep_parameters(self._stored)
@@ -423,7 +429,7 @@ def _restored(path: Path, scene: str, content: bytes | None) -> Results:
 
 
 def _meanings(values: NDArray[Any], attributes: Mapping[str, Any]) -> NDArray[Any]:
-    """Return what the codes of a column mean, by its CF attributes; other values as they are."""
+    """Return the meanings of a column's codes by its CF attributes; keep values without codes."""
     if "flag_meanings" not in attributes:
         return values
     codes = np.atleast_1d(attributes["flag_values"]).tolist()
@@ -432,7 +438,7 @@ def _meanings(values: NDArray[Any], attributes: Mapping[str, Any]) -> NDArray[An
 
 
 def _labelled(data: Any) -> Any:
-    """Return a dataset whose coordinates, axes, statuses and methods have names for numbers."""
+    """Return a dataset in which coordinates, axes, statuses and methods are names, not numbers."""
     labels: dict[str, Any] = {}
     if "coordinate" in data.coords:
         labels["coordinate"] = list(np.atleast_1d(data.coordinate.attrs["labels"]))
@@ -450,12 +456,12 @@ def _unstacked(data: Any, keys: Sequence[str]) -> Any:
     Parameters
     ----------
     data : xarray.Dataset of a sweep.
-    keys : of the varied parameters.
+    keys : keys of the varied parameters.
 
     Raises
     ------
     InputError
-        If the runs are no grid.
+        If the runs are not a grid.
     """
     names = [parameter_name(key) for key in keys]
     if len(set(data.method_name.values.tolist())) > 1:
@@ -463,7 +469,8 @@ def _unstacked(data: Any, keys: Sequence[str]) -> Any:
     if len(names) == 1:
         return data.swap_dims(run=names[0]).drop_vars("run")
     values = [data[name].values.tolist() for name in names]
-    # Unstacked, a missing combination would be NaN, and one that occurs twice has no place.
+    # In the unstacked dataset, a missing combination would be NaN, and a combination that occurs
+    # twice would have no place.
     combinations = len(set(zip(*values, strict=True)))
     size = math.prod(len(set(of_name)) for of_name in values)
     if not combinations == len(data.run) == size:

@@ -20,7 +20,7 @@ from rotor_mbs.scenario.toml_file import file_path, plain_value
 from rotor_mbs.studies.run import run_scenes, solve_judged
 
 _NO_LIMIT_S = 1e9
-_SHOWN = 5  # lines of lost runs
+_SHOWN = 5  # largest number of lost runs that a message lists
 
 
 def scenes(folder: str = "") -> list[str]:
@@ -28,7 +28,7 @@ def scenes(folder: str = "") -> list[str]:
 
     Parameters
     ----------
-    folder : name of a folder, such as "paper"; by default all.
+    folder : name of a folder, such as "paper"; by default all folders.
 
     Raises
     ------
@@ -54,12 +54,12 @@ def scene(name: str) -> Scene:
 
     Parameters
     ----------
-    name : of a shipped scene, or the path of a TOML file.
+    name : name of a shipped scene, or path of a TOML file.
 
     Raises
     ------
     InputError
-        If there is no such scene; the message has the most similar name.
+        If there is no such scene; the message has the most similar name of a scene.
     TypeError
         If `name` is neither text nor a path.
 
@@ -76,10 +76,11 @@ def scene(name: str) -> Scene:
 
 
 def load(path: str | os.PathLike[str]) -> Scene:
-    """Read a scene from a TOML file; its name is that of the file.
+    """Read a scene from a TOML file.
 
-    Implausible numbers, such as 30 rad, cause a PlausibilityWarning. Raises InputError with one
-    line per error in the file, TypeError if `path` is neither text nor a path.
+    The name of the scene is the file name without its ending. Implausible numbers, such as 30 rad,
+    cause a PlausibilityWarning. Raises InputError with one line per error in the file, TypeError if
+    `path` is neither text nor a path.
     """
     return load_scene(file_path(path), check=problems_of_scene, stacklevel=3)
 
@@ -120,7 +121,7 @@ def run(
     progress: bool | None = None,
     **settings: object,
 ) -> Run | Results:
-    """Simulate a scene with one or more methods, and determine the status from the samples.
+    """Simulate a scene with one or more methods, and determine the status of each run.
 
     Parameters
     ----------
@@ -129,16 +130,16 @@ def run(
     method : str or sequence of str
         "model/integrator", as listed by `rotor-mbs list`, or a Python file that defines methods
         ("mine.py"), see docs/your-engine.md. By default lagrange/taylor, or lagrange/dop853 where
-        heyoka is not installed. For an empty list, methods are selected by the same rule as in
-        `rotor-mbs run`.
+        heyoka is not installed. For an empty list, methods are selected as by `rotor-mbs run`
+        without `-m`.
     timeout : float
-        Time limit in s for run, reference and assessment of a method. A run that exceeds it has the
-        status "timed_out" and the samples computed so far. Loading and compilation, and up to 1 s
-        of assessment, are not included.
+        Time limit in s for the run of a method with its reference and assessment. A run that
+        exceeds the limit has the status "timed_out" and the samples computed so far. Loading and
+        compilation, and up to 1 s of assessment, do not count.
     reference : bool
         Whether to compute the quad-precision reference (up to some seconds) if none is shipped.
-        With several methods it is always computed. Without a reference the status follows from the
-        samples and the energy balance.
+        With several methods a reference is always computed. Without a reference the status follows
+        from the samples and the energy balance.
     workers : int
         Number of worker processes for several methods; 0: everything runs in this process.
     progress : bool, optional
@@ -149,17 +150,19 @@ def run(
     Returns
     -------
     Run
-        For one method. For several, `Results` by method name, including the reference.
+        For one method.
+    Results
+        For several methods: the runs by method name, including the reference.
 
     Raises
     ------
     InputError
-        For an unknown method, an unknown setting, or one that is not allowed, a limit or a number
-        of workers out of range, or if one of several methods cannot represent the scene.
+        For an unknown method, for a setting that is unknown or not allowed, for a time limit or a
+        number of workers out of range, or if one of several methods cannot represent the scene.
     TypeError
         For any other argument of a wrong type, such as a text in place of a number.
     MethodRefusal
-        If the method cannot represent the scene or is not installed.
+        If a single method cannot represent the scene or is not installed.
     ResourceError
         If a worker process died or could not be started.
 
@@ -234,17 +237,17 @@ def sweep(
     Parameters
     ----------
     scene : a Scene, the name of a shipped scene, or a TOML file.
-    parameters : for each key of a number in a scene file, such as "bearing.stiffness" or
-        "initial.angles[1]", a list of values or a table as in an [[axis]] of a sweep file, such as
-        `{"uniform": [0.0, 1.0]}`.
+    parameters : varied parameters by key in a scene file, such as "bearing.stiffness" or
+        "initial.angles[1]". Each has a list of values, or a table such as `{"uniform": [0.0, 1.0]}`
+        as in an [[axis]] of a sweep file.
     methods : name of a method, or a list of names; or Python files that define methods. By default
         lagrange/taylor, or lagrange/dop853 where heyoka is not installed.
-    output : file of the dataset. A repeated call continues it after an interruption. Default: a
+    output : file of the dataset. A repeated call continues it after an interruption. By default a
         temporary file.
     workers : number of worker processes; 0: everything runs in this process.
     timeout : time limit of each run (s).
-    fresh : whether stored runs are recomputed. By default they are kept, including those of other
-        versions.
+    fresh : whether stored runs are recomputed. By default all stored runs are kept, including those
+        that were computed by other versions.
     progress : whether to show the progress. By default on a terminal and in a notebook.
     **options : other keys of a sweep file: samples, outputs, draws, seed, combine, validation,
         settings, ...
@@ -252,18 +255,18 @@ def sweep(
     Returns
     -------
     Results
-        By run number.
+        The runs by run number.
 
     Raises
     ------
     InputError
         For an invalid key, value or option, or if `output` is not the file of this sweep.
     MethodRefusal
-        If a method cannot represent the scene, or some of its variants; the other runs are stored
-        in `output`.
+        If a method cannot represent the scene: no run is computed. If a method cannot represent
+        some of the scene's variants: the other runs are stored in `output`.
     TypeError
-        For an argument of a wrong type, and a value or option that no sweep file can have, such as
-        None.
+        For an argument of a wrong type, and for a value or option that a sweep file cannot have,
+        such as None.
     ResourceError
         If worker processes died or could not be started; the other runs are stored in `output`.
 
@@ -309,7 +312,7 @@ def sweep(
 def texts(values: Iterable[str]) -> list[str]:
     """Return the texts of an iterable as a list; raise TypeError for an entry that is no text."""
     listed = list(values)
-    "".join(listed)  # refuses an entry that is no text
+    "".join(listed)  # raises TypeError for an entry that is no text
     return listed
 
 
@@ -318,7 +321,7 @@ def refuse_losses(lost: Sequence[str]) -> None:
 
     Parameters
     ----------
-    lost : a line for each such run; the message has the first of them.
+    lost : a line for each lost run; the message has the first lines.
     """
     if lost:
         more = [f"... ({len(lost)} in all)"] if len(lost) > _SHOWN else []

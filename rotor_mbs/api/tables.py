@@ -9,13 +9,14 @@ from rotor_mbs.runs.hdf5 import Column
 
 
 def data_frame(values: Mapping[str, Any], about: Mapping[str, Column], index: Any = None) -> Any:
-    """Return a pandas DataFrame whose `attrs` have the unit of each column.
+    """Return a pandas DataFrame whose `attrs` have the units of its columns.
 
     Parameters
     ----------
     values : columns by name.
-    about : what they are, by name; `attrs[NAME]` has `units` and `long_name` of each.
-    index : labels of the rows; by default they are numbered.
+    about : descriptions by name of a column; `attrs[NAME]` has the column's `units` and
+        `long_name`.
+    index : labels of the rows; by default the rows are numbered.
     """
     import pandas as pd  # late: 0.3 s
 

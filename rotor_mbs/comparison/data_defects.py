@@ -1,4 +1,7 @@
-"""Compute the interval defects of data that may lack angles or rates, and judge their rounding."""
+"""Compute the interval defects of data, and their part beyond rounding.
+
+The data may lack angles or rates.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The page of a comparison of another program's data with a scene, and its figures."""
+"""Make the page, and the figures, of a comparison of another program's data with a scene."""
 
 from __future__ import annotations
 
@@ -57,8 +57,10 @@ from rotor_mbs.scenario.keys import counted
 from rotor_mbs.solution.defects import FLOOR_SAFETY
 
 _REFERENCE = Look(PALETTE["reference"][0], "-", "", "reference")
-_SEEN = 0.02  # share of the range of a plot, about the width of the reference's band
-_CHANNELS_SHOWN = 8  # plots; those of further channels are folded
+# Smallest visible difference, as a share of the range of a plot: about the line width of the
+# reference.
+_SEEN = 0.02
+_CHANNELS_SHOWN = 8  # number of plots of channels that are shown; further plots are folded
 
 
 def comparison_page(record: Record) -> PageContent:
@@ -97,7 +99,7 @@ def comparison_page(record: Record) -> PageContent:
         name = "First outside the tolerance" if is_time else "First speed outside the tolerance"
         facts.append(Fact(name, _place(onset[0], verdict), onset[1]))
     largest = max(verdict.channels, key=lambda channel: channel.error_max, default=None)
-    # The first row of a motion is its initial state: its error says nothing of the equations.
+    # A single row of a motion is its initial state, whose error says nothing of the equations.
     if largest is not None and (verdict.rows > 1 or not is_time):
         facts.append(
             Fact("Largest error", with_unit(largest.error_max, largest.unit), largest.name)
@@ -113,11 +115,11 @@ def comparison_page(record: Record) -> PageContent:
 
 
 def comparison_answer(verdict: DataVerdict, onset: tuple[float, str] | None) -> list[Markup]:
-    """Return sentences: whether the data agree, from when on they do not, and probable causes.
+    """Return sentences on whether the data agree, the onset of a difference, and probable causes.
 
     Parameters
     ----------
-    verdict : of the comparison.
+    verdict : the verdict of the comparison.
     onset : see `onset_of`.
     """
     if verdict.agrees:
@@ -152,16 +154,17 @@ def comparison_answer(verdict: DataVerdict, onset: tuple[float, str] | None) -> 
 
 
 def _is_outside(channel: ChannelErrors, verdict: DataVerdict) -> bool:
-    """Return whether a channel is what is wrong with the data.
+    """Return whether a channel is outside the tolerance by an error of its own.
 
-    Its defect must be beyond the tolerance. A wrong value in one coordinate gives defects in the
-    others, too, which follow the reference: as long as some channel departs from the reference,
-    those that do not are not outside. A channel that cannot be judged is not outside.
+    The defect of such a channel is beyond the tolerance. A wrong value in one coordinate also
+    causes defects in coordinates that follow the reference. If some channel departs from the
+    reference, a channel that follows it is therefore not outside. A channel that cannot be judged
+    is not outside.
 
     Parameters
     ----------
     channel : the channel to be judged, one of `verdict.channels`.
-    verdict : of the comparison, with the tolerance and the errors of the other channels.
+    verdict : the verdict of the comparison, with the tolerance and the errors of all channels.
     """
 
     def is_beyond(size: float | None) -> bool:
@@ -174,9 +177,9 @@ def _is_outside(channel: ChannelErrors, verdict: DataVerdict) -> bool:
 
 
 def _tone(channel: ChannelErrors, verdict: DataVerdict) -> str:
-    """Return "good" for a channel within the tolerance, "bad" for one that is what is wrong.
+    """Return "good" for a channel within the tolerance, "bad" for a channel that is outside.
 
-    It is "" for a defect that follows from another channel's error, and where none is known.
+    Return "" if a defect follows from another channel's error, or no defect is known.
 
     Parameters
     ----------
@@ -189,12 +192,12 @@ def _tone(channel: ChannelErrors, verdict: DataVerdict) -> str:
 
 
 def _is_seen(record: Record, verdict: DataVerdict) -> bool:
-    """Return whether a channel's data leave the reference by what is seen where both are plotted.
+    """Return whether data and reference visibly differ in the plot of some channel.
 
     Parameters
     ----------
-    record : the stored comparison, with the reference and the errors of each row.
-    verdict : of it; channels within the tolerance do not count.
+    record : the stored comparison, with the data and the errors of each row.
+    verdict : the verdict of the comparison; channels within the tolerance do not count.
     """
     for channel in verdict.channels:
         name = channel_key(channel.name)
@@ -211,13 +214,14 @@ def _is_seen(record: Record, verdict: DataVerdict) -> bool:
 def onset_of(record: Record, verdict: DataVerdict) -> tuple[float, str] | None:
     """Return the first time, or speed, at which a channel is outside the tolerance, and its name.
 
-    Of an angle or a rate it is the beginning of the first interval with a defect beyond tolerance
-    and rounding; of a load the first row with such an error. None where no channel is outside.
+    For an angle or a rate, the time is the beginning of the first interval with a defect beyond
+    tolerance and rounding. For a load or a frequency, it is the first row with such an error, or
+    the first speed. The result is None if no channel is outside.
 
     Parameters
     ----------
     record : the stored comparison, with the defects and errors of each row.
-    verdict : of it.
+    verdict : the verdict of the comparison.
     """
     rows = record.arrays[verdict.axis]
     found: list[tuple[float, str]] = []
@@ -246,7 +250,7 @@ def onset_of(record: Record, verdict: DataVerdict) -> tuple[float, str] | None:
 
 
 def _place(value: float, verdict: DataVerdict) -> str:
-    """Return a time, or a speed, of at most four digits with its unit."""
+    """Return a time, or a speed, as text with at most four digits and its unit."""
     return f"{shortest(float(f'{value:.4g}'))}{SPACE}{axis_unit(verdict)}"
 
 
@@ -260,7 +264,7 @@ def _axis_of(record: Record, verdict: DataVerdict) -> Horizontal:
 
 
 def _marks(record: Record, verdict: DataVerdict, onset: tuple[float, str] | None) -> list[Mark]:
-    """Return marks of the onset of a fault, if any, and of a horizon within the data."""
+    """Return marks of the onset, if there is one, and of the horizon if it is within the data."""
     marks = [] if onset is None else [Mark("first outside", onset[0])]
     horizon, axis = verdict.horizon_s, _axis_of(record, verdict)
     if horizon is not None and axis.first < horizon < axis.last:
@@ -269,15 +273,15 @@ def _marks(record: Record, verdict: DataVerdict, onset: tuple[float, str] | None
 
 
 def _channel_section(record: Record, verdict: DataVerdict, marks: Sequence[Mark]) -> Section:
-    """Return the plots of every channel's data upon the reference.
+    """Return the section with the plots of each channel's data over the reference.
 
     Channels outside the tolerance come first.
 
     Parameters
     ----------
     record : the stored comparison, with the rows of the data.
-    verdict : of it.
-    marks : of onset and horizon; the first plot has their texts.
+    verdict : the verdict of the comparison.
+    marks : marks of onset and horizon; only the first plot has their texts.
     """
     rows, axis = record.arrays[verdict.axis], _axis_of(record, verdict)
     plots: list[Plot] = []
@@ -305,7 +309,7 @@ def _channel_section(record: Record, verdict: DataVerdict, marks: Sequence[Mark]
                 curves,
                 170,
                 clip=clip,
-                # the first plot has the texts of the marks
+                # only the first plot has the texts of the marks
                 marks=marks if not plots else [Mark("", mark.x) for mark in marks],
                 still=len(plots) < 2,
             )
@@ -328,13 +332,13 @@ def _channel_section(record: Record, verdict: DataVerdict, marks: Sequence[Mark]
 
 
 def _error_section(record: Record, verdict: DataVerdict, marks: Sequence[Mark]) -> Section:
-    """Return the plots of the channels' errors and interval defects, with the tolerance.
+    """Return the section with the plots of errors and of interval defects with the tolerance.
 
     Parameters
     ----------
     record : the stored comparison, with the errors and defects of each row.
-    verdict : of it.
-    marks : of onset and horizon.
+    verdict : the verdict of the comparison.
+    marks : marks of onset and horizon.
     """
     rows, axis = record.arrays[verdict.axis], _axis_of(record, verdict)
     channels = _drawn(verdict)
@@ -348,7 +352,7 @@ def _error_section(record: Record, verdict: DataVerdict, marks: Sequence[Mark]) 
             sizes = draw.positive(_array(record, channel, ending))
             known = np.isfinite(sizes)
             if known.any():
-                # A line needs two samples side by side.
+                # A line needs two adjacent samples: single samples are drawn as dots.
                 dots = "" if (known[1:] & known[:-1]).any() else "only"
                 curves.append(Curve(channel.name, look, rows, sizes, dots=dots))
     plots: list[list[Element]] = []
@@ -381,12 +385,12 @@ def _error_section(record: Record, verdict: DataVerdict, marks: Sequence[Mark]) 
 
 
 def _table_section(record: Record, verdict: DataVerdict) -> Section:
-    """Return the section with the table of channels, a row each.
+    """Return the section with the table of channels, one row per channel.
 
     Parameters
     ----------
     record : the stored comparison; its loads are the channels without interval defects.
-    verdict : of it.
+    verdict : the verdict of the comparison.
     """
     table = channel_table(verdict)
     rows: list[Row] = []
@@ -410,7 +414,7 @@ def _reading_section(verdict: DataVerdict) -> Section:
 
     Parameters
     ----------
-    verdict : of the comparison; its third and further probable causes are notes here.
+    verdict : the verdict of the comparison; its third and further probable causes are notes here.
     """
     read = Listing([(place, line) for place, line in enumerate_lines(verdict.read)])
     folds: list[Fold | Grid | Element] = [
@@ -431,7 +435,7 @@ def _reading_section(verdict: DataVerdict) -> Section:
 
 
 def enumerate_lines(lines: Sequence[str]) -> list[tuple[str, str]]:
-    """Return lines "what = column" as pairs; a line without an equals sign has "" before it."""
+    """Split lines "what = column" into pairs; a line without " = " becomes ("", line)."""
     pairs = []
     for line in lines:
         what, _, column = line.partition(" = ")
@@ -449,7 +453,7 @@ def error_panels(record: Record) -> Panels:
     Raises
     ------
     InputError
-        Where no channel was compared.
+        If no channel was compared.
     """
     verdict = verdict_of(record)
     channels = _drawn(verdict)
@@ -461,7 +465,7 @@ def error_panels(record: Record) -> Panels:
         for channel in channels
     ]
     panels = plots.errors(series, f"error ({channels[0].unit})", verdict.horizon_s)
-    # Set it here: where no error is above zero nothing is drawn, and the axis would have no range.
+    # If no error is above zero, nothing is drawn, and the axis has no range: it is set here.
     if len(rows) and rows[-1] > rows[0]:
         panels.axes[-1].set_xlim(rows[0], rows[-1])
     if verdict.axis == "speed":
@@ -470,7 +474,7 @@ def error_panels(record: Record) -> Panels:
 
 
 def defect_panels(record: Record) -> Panels | None:
-    """Plot the defects of each channel over time, with the tolerance; return None without any.
+    """Plot the defects over time with the tolerance; return None if no channel has defects.
 
     Parameters
     ----------
@@ -497,7 +501,7 @@ def _array(record: Record, channel: ChannelErrors, ending: str = "") -> Any:
 
 
 def _drawn(verdict: DataVerdict) -> Sequence[ChannelErrors]:
-    """Return the channels that are drawn together: the angles, else those of the first unit."""
+    """Return the channels of one plot: the angles, or all with the unit of the first channel."""
     units = [channel.unit for channel in verdict.channels]
     if not units:
         return []
@@ -506,6 +510,6 @@ def _drawn(verdict: DataVerdict) -> Sequence[ChannelErrors]:
 
 
 def _look(channel: ChannelErrors) -> Look:
-    """Return the look of the channel's coordinate: 0 the rotor, 1 the pitch of blade 1, ..."""
+    """Return the look of a channel's coordinate: the number in its name, or 0 for the rotor."""
     digits = "".join(filter(str.isdigit, channel.name))
     return coordinate_look(int(digits or 0))
