@@ -63,8 +63,8 @@ _TIME_ROUNDING = 1e-9  # share of the duration by which rounding may make a time
 # motion, any unit fits.
 _MIN_COVERED = 0.3
 _MAX_PERIOD = 20  # largest number of rows from a computed row to the next, in interpolated data
-# A spline is first tried on this many rows. There the allowed difference is larger, by this share
-# of the largest number of a column.
+# A spline is tried on the first _FIRST_ROWS rows before it is tried on all rows. The allowed
+# difference is larger in these rows, by the share _NEARLY_BETWEEN of a column's largest number.
 _FIRST_ROWS, _NEARLY_BETWEEN = 401, 1e-6
 _MIN_KNOTS = 5  # smallest number of knots of a spline: a polynomial fits fewer rows, or nearly so
 # Data are called interpolated only if the reference would not pass as interpolated itself: one of
@@ -138,7 +138,7 @@ class TrajectorySearch:
 
     @property
     def allowed(self) -> float:
-        """Return the largest error per unit of growth, and largest defect, that may be left."""
+        """Return the largest error per unit of growth, and defect, that a mistake may leave, rad."""
         return max(self.tolerance, min(_LEFT * self.worst, _MAX_LEFT))
 
     def defect_left(self, correction: Correction) -> float:
@@ -228,8 +228,8 @@ def column_mistakes(
     Returns
     -------
     list of str
-        The mistakes in words; a mistake in rows or times is in one text with that in the columns.
-        Empty if mistakes do not explain the data.
+        The mistakes in words; a mistake in rows or times and one in the columns are one text. Empty
+        if mistakes do not explain the data.
     """
     data = times.change if times is not None else search.data
     inside = search.up_to_horizon(data)

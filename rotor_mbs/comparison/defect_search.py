@@ -36,8 +36,8 @@ from rotor_mbs.solution.trajectory import Array
 _LEFT, _LEFT_OF_SMALL = 1e-3, 0.15
 # Largest share of the largest defect that fitted parameters may leave, by their number.
 _LEFT_OF_FITTED = {1: 0.02, 2: 2e-3, 3: 2e-3}
-# An explanation counts as good as the best one if it leaves at most _ALIKE times as much. For
-# defects within rounding, the factor is _ALIKE_IN_ROUNDING.
+# Explanations are equally good if they leave at most _ALIKE times as much as the best one. If all
+# defects are within rounding, the factor is _ALIKE_IN_ROUNDING.
 _ALIKE = 3.0
 _ALIKE_IN_ROUNDING = 1.05
 _QUICK = 3e-5  # relative error of the effect of another model that is computed by quick steps
@@ -62,7 +62,7 @@ _MAX_CHANGE = 0.6  # largest change of a parameter, share or rad: a larger one i
 _MAX_FITTED = 8  # number of sets of each size that are fitted: the best by the linear estimate
 _MAX_PARAMETERS = 3  # largest number of parameters in a set
 _MAX_INTERVALS = 120  # largest number of intervals on which a hypothesis is tried
-_MAX_WINDOWS = 60  # the same for windows of rows, which are used if rates are fitted to the angles
+_MAX_WINDOWS = 60  # largest number of windows of rows, which are used for fitted rates
 _SMALLEST_FLOOR = 1e-18  # rad, added to the rounding of a window so that it is not zero
 # Largest number of Runge-Kutta steps in an interval: for a search of any length, for a search of
 # some seconds, and for a search in data that agree.
@@ -215,7 +215,7 @@ class DefectSearch:
     def _first_row(self) -> Array:
         """Return the first state of the data: angles, then rates, (2 (1 + blades),).
 
-        A coordinate without inertia has its initial state in the scene.
+        A coordinate without inertia keeps the scene's initial state.
         """
         scene = self._scene
         first = np.array([*scene.initial_angles, *scene.initial_rates])
@@ -238,7 +238,7 @@ class DefectSearch:
         -------
         ndarray
             (k, m) rad; for fitted rates the residuals of windows, see `_window_residuals`. Infinite
-            if other coordinates of the model move, or its equations do not hold for its scene.
+            if the model has other moving coordinates, or its equations do not hold for its scene.
         """
         if model.scene.moving_coordinates != self._moving:
             return np.full_like(self._values, np.inf)
@@ -449,8 +449,8 @@ class DefectSearch:
         Returns
         -------
         ndarray
-            (k, m), per unit of the parameter's change; not finite if other coordinates of the
-            changed model move.
+            (k, m), per unit of the parameter's change; not finite if the changed model has other
+            moving coordinates.
         """
         residuals = []
         # Central differences: their error is of second order in the step.

@@ -30,8 +30,9 @@ _MAX_STEPS = 512  # largest number of Runge-Kutta steps in an interval
 _STANDS_OUT = 30.0
 _FAINT = 0.02
 _EVERYWHERE = 0.6  # largest share of faulty intervals: an error in more intervals is no fault
-# Faults explain the data only if the other intervals have small defects: at least the share _MOST
-# of them has defects within the tolerance, or of at most the share _OF_OTHERS of the largest one.
+# Faults explain the data only if the other intervals have small defects. In at least the share
+# _MOST of them, defects must be within the tolerance, or within the share _OF_OTHERS of the largest
+# defect.
 _MOST, _OF_OTHERS = 0.9, 1e-3
 # A fault has edges if the median defect of the intervals next to faulty intervals is at most this
 # share of the median defect of the faulty intervals.
