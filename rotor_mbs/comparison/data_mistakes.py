@@ -138,7 +138,7 @@ class TrajectorySearch:
 
     @property
     def allowed(self) -> float:
-        """Return the largest error per unit of growth, and defect, that a mistake may leave, rad."""
+        """Return the largest error per unit of growth, and defect (rad), that may be left."""
         return max(self.tolerance, min(_LEFT * self.worst, _MAX_LEFT))
 
     def defect_left(self, correction: Correction) -> float:
