@@ -1,7 +1,7 @@
-"""Error and run time: curves of methods over ladders of settings.
+"""Measurement of error and run time: curves of methods over ladders of settings.
 
-The table /bench has a row per point. The curves of a scene are timed together, in rounds over all
-their points, by one worker process on one core.
+A point is a method at one step or tolerance. The table /bench has a row per point. One worker
+process on one core times all curves of a scene: in each round it runs every point once.
 """
 
 from __future__ import annotations
@@ -53,32 +53,33 @@ from rotor_mbs.studies.stored_references import read_reference
 
 BENCH = "bench"
 
-LONG_RUN_S = 0.5  # runs longer than this are repeated LONG_REPEATS times at most
+LONG_RUN_S = 0.5  # a point whose run takes longer is timed LONG_REPEATS times at most
 LONG_REPEATS = 5
-# Shares of the budget: what the warm-up runs may take before expensive rungs are left out, so that
-# there is time for about two rounds; and what warm-ups and building may take together.
+# Two shares of the time budget. The first is for the warm-up runs: its size leaves time for about
+# two rounds. The second is for warm-up runs and building together. A rung (one point of a ladder)
+# that is expected to exceed a share is left out, with all finer ones of its ladder.
 _WARM_UP_SHARE, _BUILD_SHARE = 0.3, 0.6
-_REFERENCE_LIMIT_S = 60.0
-# A run longer than this is ended: a hanging engine must not use up the budget of the others.
+_REFERENCE_LIMIT_S = 60.0  # time limit for the run that computes the reference of a scene
+# Time limit of a warm-up run: a hanging engine must not use up the budget of the other points.
 _RUN_LIMIT_S = 10.0
-# A process that has taken this many times its budget, and some time to load engines, is considered
-# to hang in one of them.
+# A worker process is ended after _HANGING times its budget plus _LOADING_S for loading engines: it
+# is then taken to hang in an engine.
 _HANGING, _LOADING_S = 3.0, 60.0
-# Errors are compared on at most so many sample intervals: with more, every step would be shorter
-# than that of a coarse rung, and a bench would time the output of samples.
+# A benched scene has at most this many sample intervals. With more, the steps of coarse rungs would
+# not fit into an interval, and a bench would mostly time the output of samples.
 _MOST_INTERVALS = 100
 
 
 @dataclass(frozen=True, eq=False)
 class Point:
-    """Hold one method at one setting.
+    """Hold one method at one setting: a point of a curve, and a row of a table.
 
     Attributes
     ----------
     method : name of the method.
     setting : the step (s) or the tolerance.
-    settings : settings of the method that the ladder sets.
-    known : columns of the row that are known before it is measured, by name.
+    settings : the method's settings at this point, by name.
+    known : columns of the row that are known before the point is measured, by name.
     """
 
     method: str
@@ -93,12 +94,12 @@ class Curve:
 
     Attributes
     ----------
-    scene : with all its samples, of which a bench uses a part.
-    name : the method's name, with its fixed settings where they are not the default ones.
-    kind : STEP or TOLERANCE.
-    points : one for each setting, coarse to fine.
-    table : name of the table of its rows.
-    target : rad; the step that makes this error is looked for; 0 where none is.
+    scene : the scene with all its samples; a bench uses a part of them.
+    name : the method's name, followed by the ladder's variant if there is one.
+    kind : STEP or TOLERANCE, the kind of setting that changes along the curve.
+    points : a point for each setting, coarse to fine.
+    table : name of the table that has the curve's rows.
+    target : error in rad for which the curve shall give the step; 0 if no step is wanted.
     """
 
     scene: Scene
@@ -115,34 +116,34 @@ class Curve:
 
     @property
     def label(self) -> str:
-        """Return a text for messages: scene, curve and table."""
+        """Return the scene, curve and table as text for messages."""
         return f"{self.scene.name} {self.name} {self.table}"
 
     @property
     def key(self) -> tuple[str, str, str]:
-        """Return the table, scene and curve by which its rows are found."""
+        """Return the names of table, scene and curve, which identify the curve in a file."""
         return self.table, self.scene.name, self.name
 
     def places(self, file: TableFile) -> list[RowLocation]:
-        """Return the locations of its rows in `file`."""
+        """Return the location in `file` of the row of each point."""
         return [file.place(str(point.known["run"]), self.table) for point in self.points]
 
     def is_stored(self, file: TableFile) -> bool:
-        """Return whether all of its rows are stored in `file`."""
+        """Return whether the rows of all points are stored in `file`."""
         return all(place.is_stored for place in self.places(file))
 
 
 def curve_of(scene: Scene, method: Method, ladder: Ladder, options: Mapping[str, object]) -> Curve:
     """Return the curve of a method's ladder on a scene.
 
-    The points end at the first setting that the scene does not allow, a step too small for its
-    duration.
+    The curve ends before the first step that is too small for the scene's duration.
 
     Parameters
     ----------
-    scene, method : what is run.
+    scene, method : the scene, and the method that computes it.
     ladder : settings of the method, coarse to fine; its variant is part of the curve's name.
-    options : of the study, stored with each point, with facts of the method for the report.
+    options : options of the study; each point stores them, together with facts about scene and
+        method that the report shows.
     """
     name, (short, _) = method.name + ladder.variant, coarsened(scene)
     facts = {
@@ -163,7 +164,7 @@ def curve_of(scene: Scene, method: Method, ladder: Ladder, options: Mapping[str,
     for setting, chosen in ladder.settings_by_value(short.duration / (short.samples - 1)).items():
         try:
             known = RunRequest(scene, method.name, chosen).known | of_all
-        except InputError:  # a step that is too small for the scene's duration; all finer ones are
+        except InputError:  # the step is too small for the scene's duration, and finer ones are too
             break
         known |= {kind: setting if kind == ladder.kind else math.nan for kind in (STEP, TOLERANCE)}
         known["run"] = f"{scene.name}/{name} {ladder.kind}={setting:.6g}"
@@ -172,22 +173,22 @@ def curve_of(scene: Scene, method: Method, ladder: Ladder, options: Mapping[str,
 
 
 class PointTimer:
-    """Build a point, run it as often as asked, and judge the last run.
+    """Build the solver of a point, run it repeatedly, and judge the last run.
 
     Parameters
     ----------
-    point, scene : what is run.
-    reference : angles that errors are taken from; None without one.
-    warm_up_limit_s : s, after which the warm-up run is ended.
+    point, scene : the point, and the scene that it computes.
+    reference : trajectory against which errors are computed; None if there is no reference.
+    warm_up_limit_s : time limit of the warm-up run, s.
     clock : function that returns a time in s.
 
     Attributes
     ----------
-    warm_s : s, of the warm-up run; where the point failed, the time until then.
+    warm_s : duration of the warm-up run, s; if it failed, the time from the start of building.
     is_repeatable : whether the warm-up run was completed without an error.
     is_stopped : whether the warm-up run was ended at its limit.
-    times : s, of the timed runs.
-    left_out : why it was not run; "" if it was.
+    times : durations of the timed runs, s.
+    left_out : the reason why the point was not run; "" if it was run.
     """
 
     def __init__(
@@ -206,10 +207,10 @@ class PointTimer:
         self.times: list[float] = []
 
     def warm_up(self) -> None:
-        """Build the solver twice, the second time with everything compiled, and run it once.
+        """Build the solver twice, and run it once.
 
-        An error is not raised but becomes the outcome of the point; only errors of the system are
-        raised.
+        The first build includes compilation, the second does not. Errors of the system are raised;
+        any other error is not raised, but becomes the outcome of the point.
         """
         start = self._clock()
         try:
@@ -222,8 +223,8 @@ class PointTimer:
                     self._setup[name] = self._clock() - begun
                 if not gc.isenabled():
                     gc.collect()
-                # With a limit engines check the time after every step, which takes time: only the
-                # warm-up run of a bench has one.
+                # Under a time limit, engines check the time after every step, which takes time.
+                # Only the warm-up run has a limit, so that the timed runs are not slowed down.
                 with time_limit(self._warm_up_limit_s):
                     self.warm_s = self.run()
                 if self._integration.out_of_time:
@@ -245,15 +246,16 @@ class PointTimer:
             self.warm_s = self._clock() - start
 
     def run(self) -> float:
-        """Integrate once and return the time taken in s."""
+        """Integrate once, and return the run time in s."""
         start = self._clock()
         self._integration = self._solver.integrate()
         return self._clock() - start
 
     def row(self) -> dict[str, Any]:
-        """Return the columns of the point, by name.
+        """Return the measured columns of the point, by name.
 
-        `same` tells whether the angles of the last run equal those of the first bit by bit.
+        The column `same` tells whether the last run has the angles of the warm-up run, bit by bit;
+        a point that failed or was not run lacks it.
         """
         if self.is_repeatable:
             return self._setup | statistics(self.times) | self.judge()
@@ -262,25 +264,25 @@ class PointTimer:
         return {"status": status, "message": message, "run_time_s": self.warm_s, **nothing}
 
     def judge(self) -> dict[str, Any]:
-        """Return the judgement of the last run, with the time to compute its samples.
+        """Compute the samples of the last run, and judge them.
 
         Returns
         -------
         dict
-            Columns by name: status, message, metrics, steps, output_time_s (s) and `same`. A run
-            that did not reach the end has no metrics: they would be of its part.
+            Columns by name: status, message, false_success, metrics, steps, output_time_s (time in
+            s to compute the samples) and `same`. A run that did not reach the end has no metrics.
         """
         start = self._clock()
         trajectory = self._solver.observe()
         output = self._clock() - start
         point, scene, integration = self._point, self._scene, self._integration
         run = Solution(scene, point.method, trajectory, integration, dict(point.settings))
-        with np.errstate(over="ignore", invalid="ignore"):  # a runaway's distances may overflow
+        with np.errstate(over="ignore", invalid="ignore"):  # unbounded angles may overflow
             judgement = judge(scene, run, self._reference)
         del self._solver
         status = judgement.status
         return {
-            # metrics of a run that broke off would be those of its first part
+            # Metrics of a run that ended early would describe only the part that was computed.
             **(judgement.metrics if status in COMPLETE else {}),
             "status": status,
             "message": judgement.message,
@@ -295,9 +297,9 @@ class PointTimer:
 
 
 def statistics(times: Sequence[float]) -> dict[str, float]:
-    """Return statistics of run times in s, by the names they are stored under.
+    """Return statistics of run times in s, by the names of their columns.
 
-    Quartiles are interpolated between the order statistics.
+    Quartiles are interpolated between neighbouring times.
     """
     low, middle, high = map(float, np.quantile(times, (0.25, 0.5, 0.75)))
     return {
@@ -315,13 +317,14 @@ def time_in_rounds(
     repeats: int,
     clock: Callable[[], float],
 ) -> None:
-    """Warm up every point, the cheapest next rung of any ladder first, then time them in rounds.
+    """Warm up every point, then time the points in rounds.
 
     Parameters
     ----------
-    ladders : points, each ladder coarse to fine; their `times` are filled.
-    budget_s : s on `clock`, for all of it.
-    repeats : timed runs of each point at most; fewer where a run is longer than LONG_RUN_S.
+    ladders : points of each ladder, coarse to fine; their `times` are filled.
+    budget_s : time budget for warming up and timing, s on `clock`.
+    repeats : maximum number of timed runs of a point; for points whose run takes longer than
+        LONG_RUN_S it is at most LONG_REPEATS.
     clock : function that returns a time in s.
     """
     start = clock()
@@ -333,7 +336,7 @@ def time_in_rounds(
     allowed = allocate_repeats(
         [max(point.warm_s, 1e-9) for point in points], wanted, budget_s - (clock() - start)
     )
-    # One run of every point in each round: when the machine is slow for a while, all points are.
+    # Each round runs every point once, so that a slow phase of the machine slows all points alike.
     for round_ in range(max(allowed, default=0)):
         for point, count in zip(points, allowed, strict=True):
             if round_ and clock() - start > budget_s:  # the machine has become slower
@@ -345,14 +348,14 @@ def time_in_rounds(
 def _warm_all(
     ladders: Sequence[Sequence[PointTimer]], budget_s: float, clock: Callable[[], float]
 ) -> None:
-    """Warm up all rungs, always the one next that is expected to be cheapest.
+    """Warm up the points of all ladders, in the order of their expected run time.
 
-    Where even that one does not fit the budget, it and all finer ones of its ladder are left out.
+    If the next point of a ladder does not fit the budget, it and all finer ones are left out.
 
     Parameters
     ----------
-    ladders : points, each ladder coarse to fine.
-    budget_s : s, of which warm-ups and building may take a share.
+    ladders : points of each ladder, coarse to fine.
+    budget_s : time budget of the scene, s; warm-up runs and building may take a share of it.
     clock : function that returns a time in s.
     """
     start, warm_s = clock(), 0.0
@@ -368,28 +371,30 @@ def _warm_all(
         ladder[rung].warm_up()
         warm_s += ladder[rung].warm_s
         if rung + 1 < len(ladder):
-            # The next rung is expected to take longer by the same factor as this one, 2 to 10.
+            # The next run is expected to take longer than this one by the factor between this one
+            # and the one before; the factor is limited to 2 to 10.
             last, before = ladder[rung].warm_s, ladder[rung - 1].warm_s if rung else 0.0
             growth = last / before if before > 0.0 else 2.0
             heapq.heappush(waiting, (last * min(max(growth, 2.0), 10.0), rung + 1, number))
 
 
 def allocate_repeats(seconds: Sequence[float], wanted: Sequence[int], budget_s: float) -> list[int]:
-    """Return the number of repeats of each point: what its share of time allows, at least one.
+    """Return the number of repeats of each point that fit its share of the time budget.
 
-    A point gets no more than it wants. What points that want less than an equal share leave is
-    shared by the others.
+    The points share the budget equally. If the wanted repeats of a point take less than its share,
+    the rest is divided among the other points. Every point is run at least once.
 
     Parameters
     ----------
     seconds : time of one run of each point, s.
-    wanted : repeats of each point at most.
-    budget_s : s, for all points.
+    wanted : maximum number of repeats of each point.
+    budget_s : time for all points, s.
     """
     counts = [0] * len(seconds)
     by_demand = sorted(range(len(seconds)), key=lambda i: wanted[i] * seconds[i])
-    # The least demanding first: what they leave raises the share of those after them. The factor
-    # keeps rounding from taking a run off a share that is a whole number of runs.
+    # Points that need the least time come first: the time that they leave over raises the share of
+    # the points after them. The factor 1 + 1e-12 prevents that rounding removes a run from a share
+    # that is a whole number of runs.
     for done, i in enumerate(by_demand):
         share = budget_s / (len(by_demand) - done) * (1.0 + 1e-12)
         counts[i] = max(1, min(wanted[i], int(share / seconds[i])))
@@ -404,21 +409,21 @@ def measure(
     repeats: int,
     budget_s: float,
 ) -> list[list[dict[str, Any]]]:
-    """Measure the columns of every point, by curve: timed in rounds over all points, then judged.
+    """Time the points of all curves in rounds, judge them, and return their columns.
 
-    It is for a process that does nothing else: engines are loaded beforehand, which is part of no
-    run's time, and the garbage collector is off.
+    Engines are loaded before the first run, so that loading is not part of a run time. The garbage
+    collector is switched off and stays off: the process must do nothing else.
 
     Parameters
     ----------
     curves : curves of one scene.
-    scene, reference : as they are benched (`bench_inputs`).
-    repeats, budget_s : timed runs of a point at most, and s for all of them.
+    scene, reference : the scene as it is benched, and its reference (`bench_inputs`).
+    repeats, budget_s : maximum number of timed runs of a point, and time for all points in s.
 
     Returns
     -------
     list of list of dict
-        Columns by name, for each point of each curve.
+        Columns by name: a list for each curve, with a dict for each point.
     """
     for method in dict.fromkeys(curve.method for curve in curves):
         catalogue.find_method(method).import_engine()
@@ -432,7 +437,9 @@ def measure(
 
 
 def bench_inputs(scene: Scene, place: RowLocation) -> tuple[Scene, Trajectory]:
-    """Return a scene as it is benched, without loads and with fewer samples, and its reference.
+    """Return a scene as it is benched, and its reference at the samples of that scene.
+
+    A benched scene has fewer samples (`coarsened`) and no output of loads.
 
     Parameters
     ----------
@@ -442,7 +449,7 @@ def bench_inputs(scene: Scene, place: RowLocation) -> tuple[Scene, Trajectory]:
     Raises
     ------
     InputError
-        If there is no reference, or it does not reach the end.
+        If there is no reference, or the reference does not reach the end.
     """
     reference = read_reference(place, scene)
     if reference is None or len(reference.time) < scene.samples:
@@ -458,10 +465,10 @@ def bench_inputs(scene: Scene, place: RowLocation) -> tuple[Scene, Trajectory]:
 
 
 def coarsened(scene: Scene) -> tuple[Scene, int]:
-    """Return the scene with every k-th sample, and k.
+    """Return the scene with every k-th sample only, and k.
 
-    It is the finest thinning with at most 100 intervals; k is 1 where that would leave too few
-    samples.
+    The smallest k is taken that divides the number of sample intervals and leaves at most
+    _MOST_INTERVALS. If it leaves fewer than a fifth of _MOST_INTERVALS, k is 1.
     """
     intervals = scene.samples - 1
     k = next(
@@ -472,8 +479,8 @@ def coarsened(scene: Scene) -> tuple[Scene, int]:
         ),
         1,
     )
-    # A number of intervals without a suitable divisor would leave too few samples to find the
-    # largest error.
+    # If the number of intervals has no suitable divisor, for example if it is a prime, too few
+    # samples would be left to find the largest error.
     k = k if intervals // k >= _MOST_INTERVALS // 5 or intervals <= _MOST_INTERVALS else 1
     return replace(scene, samples=intervals // k + 1), k
 
@@ -482,9 +489,9 @@ def coarsened(scene: Scene) -> tuple[Scene, int]:
 
 
 def curve_tables(curves: Sequence[Curve]) -> list[TableSpec]:
-    """Return the specification of the table with the points of `curves`, which share one table.
+    """Return a list with the specification of the table that holds the points of `curves`.
 
-    The list is empty if there are no curves.
+    All curves must name the same table. The list is empty if there are no curves.
     """
     return (
         [points_table(curves[0].table, [p.known for curve in curves for p in curve.points])]
@@ -500,9 +507,10 @@ class CurveTask(Task):
     Attributes
     ----------
     curve : the curve.
-    longest_s : s; a run over this is the last of the curve, as the next one takes several times as
-        long. So is one whose error is a tenth of the curve's target.
-    limit_s : s; a run over this is ended.
+    longest_s : s; after a run that takes longer, the finer points are left out, because the next
+        run would take several times as long. They are also left out after a run with status ok
+        whose error is below a tenth of the curve's target.
+    limit_s : time limit of a run, s.
     """
 
     curve: Curve
@@ -510,7 +518,7 @@ class CurveTask(Task):
     limit_s: float
 
     def perform(self) -> Rows:
-        """Run and judge the points of one curve, and return their rows."""
+        """Run and judge the points of the curve, and return their rows."""
         curve, facts = self.curve, dict[str, Any]()
         scene, reference = curve.scene, None
         if curve.table == BENCH:
@@ -546,14 +554,14 @@ def curve_tasks(
     longest_s: float,
     limit_s: float = math.inf,
 ) -> list[CurveTask]:
-    """Return a task for each curve, which runs each of its points once.
+    """Return a task for each curve, which runs each point of the curve once.
 
     Parameters
     ----------
-    file : the results file, which has a row for each point.
+    file : the results file; it has a row for each point.
     curves : the curves that are measured.
-    kill_after_s : s, after which the worker process of a whole curve is ended.
-    longest_s, limit_s : s, see `CurveTask`.
+    kill_after_s : time for a whole curve, s; after it the worker process is ended.
+    longest_s, limit_s : limits in s, see `CurveTask`.
     """
     return [
         CurveTask(
@@ -582,16 +590,19 @@ def run_bench(
     workers: int,
     on_progress: OnProgress = ignore_progress,
 ) -> tuple[list[RunOutcome], list[Refusal]]:
-    """Measure the curves of every scene into a results file; what it has already is kept.
+    """Measure the curves of every scene, and store them in a results file.
+
+    A curve that the file has is measured again only if what was requested or the versions differ,
+    or if the reference of its scene was computed again.
 
     Parameters
     ----------
-    scenes : the scenes, each of which needs a reference that reaches the end.
-    methods : names of methods whose ladders are measured; all where none is named.
+    scenes : the scenes; one without a reference that reaches the end is left out.
+    methods : names of the methods whose ladders are measured; if empty, all methods.
     output : the results file.
-    repeats : timed runs of each point at most.
-    budget_s : s, for all curves of a scene.
-    workers : processes that compute references before the first curve is timed.
+    repeats : maximum number of timed runs of a point.
+    budget_s : time for all curves of a scene, s.
+    workers : number of processes that compute references before the first curve is timed.
     on_progress : called after each curve.
 
     Returns
@@ -599,13 +610,13 @@ def run_bench(
     list of RunOutcome
         The curves measured by this call.
     list of Refusal
-        What was left out: methods that cannot represent a scene, and scenes without a usable
-        reference.
+        Methods that cannot represent a scene, and scenes without a usable reference; both are left
+        out.
 
     Raises
     ------
     InputError
-        For a method without a ladder, and if no curve is left.
+        If a method has no ladder, or if no curve is left.
     StoreError
         If the file cannot be read or written.
     """
@@ -613,7 +624,7 @@ def run_bench(
     with locked(output):
         none: Mapping[str, Sequence[str]] = {scene.name: () for scene in scenes}
         references = run_scenes(scenes, none, output, workers=workers, timeout_s=_REFERENCE_LIMIT_S)
-        # scenes whose reference was computed again: their curves are measured again
+        # Scenes whose reference was computed by this call: all their curves are measured again.
         changed = {run.scene: run for run in references if run.is_computed}
         failed = {name: run for name, run in changed.items() if run.has_failed or not run.is_stored}
         curves: list[Curve] = []
@@ -662,7 +673,7 @@ class BenchTask(Task):
     Attributes
     ----------
     curves, places : the curves, and the location of the first row of each.
-    repeats, budget_s : timed runs of a point at most, and time for all of them in s.
+    repeats, budget_s : maximum number of timed runs of a point, and time for all points in s.
     """
 
     curves: Sequence[Curve]
@@ -674,7 +685,7 @@ class BenchTask(Task):
         """Time all points of the curves, and return their rows, curve after curve."""
         assert self.reference is not None
         scene, reference = bench_inputs(self.curves[0].scene, self.reference)
-        core = last_core()  # to which this process is bound, see `measured`
+        core = last_core()  # `measured` has bound this process to that core
         facts = facts_of(scene, reference) | {"pinned_core": -1 if core is None else core}
         points = measure(self.curves, scene, reference, self.repeats, self.budget_s)
         parts = []
@@ -683,12 +694,12 @@ class BenchTask(Task):
         return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
     def store(self, rows: Rows) -> None:
-        """Write the rows of each curve to their place in the file."""
+        """Write the rows of each curve to their location in the file."""
         for part, place in zip(self.parts(rows), self.places, strict=True):
             place.write(part)
 
     def split(self) -> list[BenchTask]:
-        """Return a task for each curve; an empty list if there is only one."""
+        """Return a task for each curve; an empty list if the task has only one curve."""
         if len(self.curves) == 1:
             return []
         pairs = zip(self.curves, self.places, strict=True)
@@ -697,7 +708,7 @@ class BenchTask(Task):
         ]
 
     def parts(self, rows: Rows) -> list[Rows]:
-        """Return the rows of each curve."""
+        """Divide the rows of the task into those of each curve."""
         parts, first = [], 0
         for curve in self.curves:
             last = first + len(curve.points)
@@ -709,14 +720,14 @@ class BenchTask(Task):
 def bench_task(
     file: TableFile, curves: Sequence[Curve], repeats: int, budget_s: float
 ) -> BenchTask:
-    """Return the task that measures curves of one scene, see `BenchTask`.
+    """Return the task that times curves of one scene together.
 
     Parameters
     ----------
-    file : the results file, which has a row for each point.
-    curves : at least one, all of the same scene.
-    repeats, budget_s : timed runs of a point at most, and s for all of them; a process that takes
-        several times as long is ended.
+    file : the results file; it has a row for each point.
+    curves : at least one curve; all are of the same scene.
+    repeats, budget_s : maximum number of timed runs of a point, and time for all points in s; a
+        process that takes several times as long is ended.
     """
     scene = curves[0].scene.name
     places = [curve.places(file)[0] for curve in curves]
@@ -734,9 +745,9 @@ def bench_task(
 
 
 def measured(task: BenchTask) -> Iterator[RunOutcome]:
-    """Perform a task in a process on one core, and yield the outcome of each of its curves.
+    """Perform a task in a worker process on one core, and yield the outcome of each curve.
 
-    Where the process of a task died, its curves are reported as not stored.
+    If the process died, the curves that it computed are reported as not stored.
 
     Parameters
     ----------
@@ -768,14 +779,17 @@ def rows_of_curve(
     points: Sequence[Mapping[str, Any]],
     facts: Mapping[str, object],
 ) -> Rows:
-    """Return the rows of a curve, with its order of convergence, or the step for its target.
+    """Return the rows of a curve.
+
+    If the curve has a target, its rows include the step for that error. Otherwise the rows of a
+    curve over steps include the order of convergence.
 
     Parameters
     ----------
     place : location of the first row of the curve.
-    curve : its target decides whether a step is looked for or an order is fitted.
-    points : columns of each point, by name.
-    facts : columns that all its points have in common.
+    curve : the curve.
+    points : measured columns of each point, by name.
+    facts : columns with the same value at all points of the curve, by name.
     """
     facts = {**facts, "repeatable": int(all(point.get("same", True) for point in points))}
     each = [
@@ -797,12 +811,13 @@ def rows_of_curve(
 
 
 def facts_of(short: Scene, reference: Trajectory) -> dict[str, Any]:
-    """Return the columns that all points of a benched scene have in common.
+    """Return the columns that have the same value at all points of a benched scene, by name.
 
     Parameters
     ----------
-    short : the scene as it is benched.
-    reference : its reference at the same samples; the uncertainty is taken up to its horizon.
+    short : the scene as it is benched, with fewer samples.
+    reference : the reference at the same samples; the largest uncertainty up to its horizon is one
+        of the columns.
     """
     uncertainty = reference.angle_uncertainty
     compared = max(horizon_samples(reference), 1)

@@ -42,19 +42,20 @@ from rotor_mbs.studies.stored_references import shipped_reference
 
 _DEFAULT_SCENES = ("paper", "check")
 _TIMEOUT_S = 60.0
-AGAINST = "against"  # the name of the checks that compare with an earlier file
-CHANGED = "scene"  # the name of those that compare the scenes of both
-_SHOWN_CHANGES = 10  # keys of a scene
-_OF_EVERY_RUN = "status"  # the name of a check that each run has one of
-# A value below a few units in the last place of a double is rounding: its change says nothing.
+AGAINST = "against"  # name of the checks that compare with an earlier file
+CHANGED = "scene"  # name of the checks that compare the scenes of this file and the earlier one
+_SHOWN_CHANGES = 10  # maximum number of differing keys of a scene that a hint lists
+_OF_EVERY_RUN = "status"  # name of the check that every run has exactly once
+# Values below this, a few units in the last place of a double, are rounding errors. They are raised
+# to this value before they are compared: a change among rounding errors means nothing.
 _ROUNDING = 2.0**-50
-_SHRINK = 10.0  # times by which a margin may be smaller than in an earlier file
+_SHRINK = 10.0  # factor by which a margin may be smaller than in an earlier file
 
 
 def check_file(path: Path, bounds: Bounds, required: Sequence[str] = ()) -> list[Check]:
-    """Check what is stored in a file, and that each required method has run.
+    """Check the stored runs of a file, and that each required method has run.
 
-    Every scene of a results file, or the sweep, must have a run of each of these methods.
+    Each scene of a results file must have a run of every required method, and so must a sweep.
 
     Parameters
     ----------
@@ -65,14 +66,14 @@ def check_file(path: Path, bounds: Bounds, required: Sequence[str] = ()) -> list
     Raises
     ------
     InputError
-        If there is no run of a method, as in a bench file or a file of references.
+        If the file has no runs except references, as a bench file or a file of references.
     StoreError
         If the file cannot be read.
     """
     checks = judge_file(path, bounds)
     if all(check.passed and check.where.method == REFERENCE for check in checks):
         raise InputError(f"{path}: nothing to check: no run of a method")
-    methods: dict[str, list[str]] = {}  # by scene
+    methods: dict[str, list[str]] = {}  # methods that have run, by scene
     if is_sweep(path):
         sweep = StoredSweep(path, allow_damaged_runs=True)
         codes = np.asarray(sweep.column("method_code"))[
@@ -98,16 +99,16 @@ def check_default_set(
 ) -> list[Check]:
     """Compute the default set of runs in a temporary file, and return their checks.
 
-    The set is every scene of the paper by the default methods, and the scenes made for checking by
-    every corrected method that is installed; or all of these scenes by the `methods` that are
-    named, where they can represent them.
+    The default set has the scenes of the paper by the default methods, and the scenes made for
+    checking by every installed method with the corrected equations. If `methods` are named, they
+    compute all of these scenes instead, except those that they cannot represent.
 
     Parameters
     ----------
     bounds : bounds of all checks.
-    workers : parallel processes.
+    workers : number of parallel processes.
     on_progress : called after each run.
-    methods : names; by default those described above.
+    methods : names of methods that replace those of the default set.
     """
     paper, own = (find_scenes([folder]) for folder in _DEFAULT_SCENES)
     corrected = [name for name in method_names(is_corrected=True) if find_method(name).is_installed]
@@ -134,15 +135,18 @@ def check_default_set(
 
 
 def _required(scene: str, method: str, hint: str, *, is_missing: bool = True) -> Check:
-    """Return the check that a scene has a run of a required method; it fails if that is missing."""
+    """Return the check that a scene has a run of a required method.
+
+    The check fails if the run is missing.
+    """
     return Check("required", Where(scene, method, "run"), float(is_missing), 0.0, hint, "missing")
 
 
 def judge_file(path: Path, bounds: Bounds) -> list[Check]:
-    """Return the checks of the runs, or the sweep, in a file; an empty list if it has neither.
+    """Return the checks of a results file or a sweep.
 
-    Of a sweep only completeness and integrity are checked: its runs were judged when they were
-    computed.
+    The runs of a results file are checked in full, and the list is empty if it has none. A sweep is
+    checked for completeness and integrity only, because its runs were judged when computed.
 
     Parameters
     ----------
@@ -152,14 +156,13 @@ def judge_file(path: Path, bounds: Bounds) -> list[Check]:
     Raises
     ------
     InputError, StoreError
-        If a stored scene is not valid, or the file cannot be read.
+        If a stored scene is not valid (InputError), or the file cannot be read (StoreError).
     """
     writer = (
         "; another process is writing it, or was killed while it did"
         if is_being_written(path)
         else ""
     )
-    # all runs are there, and as written; their energies were judged when they were computed
     if is_sweep(path):
         sweep = StoredSweep(path, allow_damaged_runs=True)
         where = Where(str(sweep.attributes.get("base_scene", "sweep")), "*", "runs")
@@ -187,7 +190,7 @@ def judge_file(path: Path, bounds: Bounds) -> list[Check]:
             )
             for file in {known.path for known in frozen if known is not None}
         ]
-        with reading(path):  # within the shipped ones, which are not what is wrong
+        with reading(path):  # an error in this block is reported as one of `path`
             checks = checks_of(results, shipped, bounds)
     runs = TableFile(path, [RUNS]).tables.get(RUNS)
     missing = 0 if runs is None else int((runs.column("status") == MISSING).sum())
@@ -198,13 +201,13 @@ def judge_file(path: Path, bounds: Bounds) -> list[Check]:
 
 
 def runs_gone(path: Path, earlier: Path) -> Check:
-    """Check that the sweep at `path` has every run of an earlier one.
+    """Check that the sweep at `path` has every run of an earlier sweep.
 
-    A run is found by its method and its varied numbers.
+    Runs of both sweeps correspond if their methods and their varied numbers are equal.
 
     Parameters
     ----------
-    path, earlier : the sweep that is checked, and the earlier one.
+    path, earlier : the sweep that is checked, and the earlier sweep.
     """
     new, old = (StoredSweep(place, allow_damaged_runs=True) for place in (path, earlier))
     methods = [*old.methods, *new.methods]
@@ -225,7 +228,9 @@ def runs_gone(path: Path, earlier: Path) -> Check:
 
 
 def scenes_checked(path: Path | None) -> dict[str, Scene]:
-    """Return the scenes of a file by name; of a sweep the one that is varied.
+    """Return the scenes of a file by name.
+
+    A sweep has one: the base scene, whose parameters are varied.
 
     Parameters
     ----------
@@ -250,12 +255,15 @@ def scenes_checked(path: Path | None) -> dict[str, Scene]:
 def changed_scenes(
     new: Mapping[str, Scene], old: Mapping[str, Scene], *, are_allowed: bool = False
 ) -> list[Check]:
-    """Compare the scenes that have the same name: a check for each, of how many keys differ.
+    """Return a check for each name that is in both sets of scenes.
+
+    The value of the check is the number of keys in which the two scenes differ.
 
     Parameters
     ----------
     new, old : scenes by name.
-    are_allowed : whether scenes may differ; the differences are reported in either case.
+    are_allowed : whether scenes may differ. If they may, the check passes; its hint lists the
+        differences in either case.
     """
     checks = []
     for name in new.keys() & old.keys():
@@ -283,15 +291,18 @@ def changed_scenes(
 def unused_bounds(
     entries: Iterable[Bound], checks: Sequence[Check], scenes: Mapping[str, Scene]
 ) -> list[Bound]:
-    """Return the entries that fit no check: a misspelt method or scene would pass unnoticed.
+    """Return the bounds that apply to no check.
+
+    They are reported, because a misspelt method or scene would otherwise pass unnoticed.
 
     Parameters
     ----------
-    entries : of a user's own file of bounds.
-    checks : those that were made.
-    scenes : that were checked, by name.
+    entries : the bounds of a user's own file.
+    checks : the checks that were made.
+    scenes : the scenes that were checked, by name.
     """
-    # Patterns of scenes are compared as `checks_of` does: with the names of shipped scenes alone.
+    # Like `checks_of`, this compares the pattern of a bound with the names of shipped scenes only.
+    # A scene that differs from the shipped scene of its name does not count as shipped.
     shipped = {name for name, scene in scenes.items() if changes_from_shipped(scene) == []}
     unused = []
     for entry in entries:
@@ -308,9 +319,9 @@ def unused_bounds(
 
 
 def judged_runs(checks: Iterable[Check]) -> Counter[str]:
-    """Return the number of runs of each method that were judged.
+    """Return the number of runs that were judged, by method.
 
-    With it a reader of the verdict notices a run that is missing.
+    The verdict prints these numbers, so that its reader notices a missing run.
     """
     return Counter(
         check.where.method
@@ -320,16 +331,19 @@ def judged_runs(checks: Iterable[Check]) -> Counter[str]:
 
 
 def changed_settings(new: Path, old: Path) -> dict[tuple[str, str], str]:
-    """Compare the settings of the runs that two results files have both.
+    """Return the changed settings of runs, by (scene, method).
+
+    Runs that only one of the files has are left out.
 
     Parameters
     ----------
-    new, old : results files; damaged settings are left to the check of them.
+    new, old : results files. A run whose settings cannot be read is left out here; its own checks
+        report the damage.
 
     Returns
     -------
     dict
-        From scene and method to "step 0.0005 -> 0.02", where the settings differ.
+        For each run whose settings differ, a text such as "step 0.0005 -> 0.02".
     """
     found: list[dict[tuple[str, str], dict[str, Any]]] = []
     for path in (new, old):
@@ -359,19 +373,25 @@ def regressions(
     changed: Collection[str] = (),
     settings: Mapping[tuple[str, str], str] | None = None,
 ) -> list[Check]:
-    """Return a check for each earlier one: by what factor its margin has shrunk.
+    """Compare the checks of a file with those of an earlier file.
 
-    A factor above ten fails. There is also a check for each run that is missing now. The value is
-    NaN, which fails, where `new` lacks the check or the run, and infinite where a check that passed
-    fails. What failed before and fails now is no regression.
+    For each check of the earlier file there is one whose value is the factor by which the margin
+    has shrunk. It fails if the factor is above ten. The value is
+
+    - NaN, which fails, if `new` lacks the check;
+    - infinite if the check passed before and fails now;
+    - 1 if it failed before and fails now, which is no regression;
+    - 0 if it failed before and passes now.
+
+    A run that is missing now has a single check, which fails.
 
     Parameters
     ----------
-    new, old : checks of this file and of the earlier one.
-    changed : names of scenes that differ: an error of one scene says nothing of that of another,
-        so only the presence of their runs is checked.
-    settings : what differs between the settings of two runs, by scene and method; it is told where
-        a margin shrank.
+    new, old : checks of this file and of the earlier file.
+    changed : names of scenes that differ between the files. For these only the presence of the runs
+        is checked: errors in different scenes cannot be compared.
+    settings : differences in the settings of a run, by (scene, method); a hint begins with them if
+        there are any.
     """
     present = {(check.name, check.where): check for check in new}
     runs = {check.where[:2] for check in new}
@@ -387,7 +407,8 @@ def regressions(
         if now is None:
             value, hint = math.nan, "checked in the earlier file, missing in this one"
         else:
-            # Of a check that fails now: infinite if it passed before, else 1.
+            # These values are for a check that fails now; the branches below are for one that
+            # passes.
             value = math.inf if check.passed else 1.0
             if now.passed and check.passed:
                 before, after = max(check.value, _ROUNDING), max(now.value, _ROUNDING)
@@ -401,7 +422,7 @@ def regressions(
                 f"{now.value:.2e} now, bound {now.bound:.2e} {now.unit}; "
             )
             other = (settings or {}).get((check.where.scene, check.where.method))
-            # What a person set comes before the causes that a defect may have.
+            # A setting that the user changed is the likelier cause: it comes before other hints.
             hint += f"settings changed: {other}; {now.hint}" if other else now.hint
         where = check.where._replace(channel=f"{check.name}: {check.where.channel}")
         changes.append(Check(AGAINST, where, value, _SHRINK, hint, "fold"))
