@@ -1,4 +1,4 @@
-"""Studies: one module per job, which computes records from scenes.
+"""Studies: one module per command, which computes runs or records from scenes.
 
-None of them knows a terminal or an argument parser.
+Modules of this package neither parse arguments nor print.
 """

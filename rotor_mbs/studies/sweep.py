@@ -1,6 +1,7 @@
 """Sweeps: the runs of a parameter study, computed into one dataset.
 
-They are divided into chunks, for worker processes or for parts on a cluster.
+A sweep can be divided into parts, which are computed on different computers. Each part is divided
+into chunks of runs, and each chunk is the task of one worker process.
 """
 
 from __future__ import annotations
@@ -54,10 +55,11 @@ from rotor_mbs.solution.quantities import energy_balance, quantities
 from rotor_mbs.solution.status import REFUSED, STATUSES, code_of
 from rotor_mbs.solution.trajectory import Array, RunBlock, Solution, Trajectory
 
-# outputs that every `Method.solve_many` computes
+# Every `Method.solve_many` computes the quantities of these entries of a scene's `outputs`. The entry
+# "" is that of quantities that no scene requests by name.
 _SIDE_BY_SIDE = ("", "angles", "rates", "tip", "energy")
 _OF_DEFECTS = ("defect_max", "defect_median", "defect_time", "angle_error_predicted")
-_GRACE_S = 5.0  # in which a run that ends itself at its limit stores what it reached
+_GRACE_S = 5.0  # time in which a run that reached its time limit ends itself and stores its row
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,10 +70,11 @@ class Chunk(Task):
     ----------
     values : (runs, keys) varied numbers.
     variants : builds the scene of a run from its row of `values`.
-    settings : of the method.
-    time_limit_s : s, of each run.
-    code : number of the versions that compute the runs, stored with each.
-    with_defects : whether runs that are computed side by side are checked by their defects, too.
+    settings : settings of the method.
+    time_limit_s : time limit of each run, s.
+    code : checksum of the versions that compute the runs, stored with each run.
+    with_defects : whether runs that are computed side by side are checked by their defects, too,
+        not by their energy alone.
     """
 
     values: NDArray[np.float64]
@@ -82,12 +85,14 @@ class Chunk(Task):
     with_defects: bool = False
 
     def perform(self) -> Rows:
-        """Return (runs, ...) columns of all its runs, failures of runs included.
+        """Compute all runs of the chunk, and return their columns, (runs, ...) each.
+
+        A run that fails has a row, too, with its status and the reason.
 
         Raises
         ------
         InputError
-            If the varied values make no scene.
+            If the varied values of a run do not make a valid scene.
         MethodRefusal
             If the method cannot represent a scene.
         """
@@ -96,8 +101,8 @@ class Chunk(Task):
         except TableError as error:
             keys, last = ", ".join(self.variants.keys), self.first + len(self.values) - 1
             raise InputError(f"runs {self.first} to {last}: {keys}: {error}") from error
-        # Runs can be computed side by side if `solve_many` computes all requested quantities, or
-        # they follow from the samples.
+        # Runs can be computed side by side if every requested quantity is computed by `solve_many`,
+        # follows from the samples, or is optional.
         asked = quantities(scenes[0].outputs)
         is_there = all(
             known.output in _SIDE_BY_SIDE or known.producer or not known.required for known in asked
@@ -113,7 +118,8 @@ class Chunk(Task):
                 except OutOfTimeError as exc:
                     each.append(self.part(i, i + 1).failed("timed_out", str(exc)))
             rows = {name: np.concatenate([row[name] for row in each]) for name in each[0]}
-        # For any method the growth is that of the closed form, from its variational equations.
+        # The error growth is a property of the scene: for every method it is computed by the closed
+        # form, from its variational equations.
         if "error_growth" in rows:
             for i, scene in enumerate(scenes):
                 angles = np.empty((scene.samples, 0))
@@ -128,19 +134,19 @@ class Chunk(Task):
         return rows
 
     def split(self) -> list[Chunk]:
-        """Return its runs as single chunks; an empty list if it is one run."""
+        """Return a chunk for each run; an empty list if this chunk has only one run."""
         return (
             [self.part(i, i + 1) for i in range(len(self.values))] if len(self.values) > 1 else []
         )
 
     def part(self, start: int, end: int) -> Chunk:
-        """Return the chunk of its runs `start` <= i < `end`."""
+        """Return a chunk with the runs start <= i < end of this chunk."""
         values = self.values[start:end]
         kill_after_s = limit_of(len(values), self.time_limit_s)
         return replace(self, place=self.place.at(start), values=values, kill_after_s=kill_after_s)
 
     def failed(self, status: str, message: str) -> Rows:
-        """Return rows of its runs with a status and its reason, in place of computed values."""
+        """Return rows for all runs of the chunk that have a status and a reason, but no values."""
         limit = self.time_limit_s if status == "timed_out" else np.nan
         values = {
             "status": status,
@@ -153,33 +159,34 @@ class Chunk(Task):
 
 
 def limit_of(runs: int, time_limit_s: float) -> float:
-    """Return the time in s after which the worker process of a number of runs is ended.
+    """Return the time in s after which the worker process of a chunk is ended.
 
-    A method may compute them one after the other; some time to store them is added.
+    It allows for runs that are computed one after the other, and for storing their rows.
 
     Parameters
     ----------
-    runs : number of runs.
-    time_limit_s : s, of each run.
+    runs : number of runs in the chunk.
+    time_limit_s : time limit of each run, s.
     """
     return time_limit_s * runs + _GRACE_S
 
 
 def _judged_row(chunk: Chunk, run: Solution) -> Rows:
-    """Return the row of a run, judged within the time limit of its chunk.
+    """Judge a run, and return its row.
 
     Raises
     ------
     OutOfTimeError
-        If judging takes longer than the time limit.
+        If judging takes longer than the time limit of a run.
     """
     with time_limit(chunk.time_limit_s):
         judgement = judge(run.scene, run, None)
     judged = replace(
         run, status=judgement.status, message=judgement.message, metrics=judgement.metrics
     )
-    # Extremes of the samples, and of the rotor those that the judgement has found, which for the
-    # printed equations are over the integrator's own output points.
+    # Extremes are those of the samples, unless the judgement computes the metric of that name. For
+    # the printed equations the judgement takes the rotor's extremes over the integrator's own
+    # output points.
     found: Metrics = {}
     for name, values in _extremes(run.angles[None], run.rates[None]).items():
         found[name] = float(values[0])
@@ -189,7 +196,7 @@ def _judged_row(chunk: Chunk, run: Solution) -> Rows:
 
 
 def _extremes(angles: Array, rates: Array) -> dict[str, Array]:
-    """Return the extremes of angle and rate of the rotor, and of the pitches, of each run, by name.
+    """Return the extremes of rotor angle, rotor rate and pitch angles of each run, by metric.
 
     Parameters
     ----------
@@ -209,12 +216,12 @@ def _extremes(angles: Array, rates: Array) -> dict[str, Array]:
 def _side_by_side(chunk: Chunk, scenes: Sequence[Scene]) -> Rows:
     """Compute all runs of a chunk at once by `Method.solve_many`, and return their rows.
 
-    Runs that are clearly ok by their energy (and defects, if asked for) get that status; only the
-    others are judged in full, one by one.
+    If the energy drift of a run (and its defects, if the chunk is to compute them) shows that it is
+    ok, the run gets the status ok. Every other run is judged in full, one by one.
 
     Parameters
     ----------
-    chunk : runs by a method that has `solve_many`.
+    chunk : the chunk; its method has `solve_many`.
     scenes : the scene of each run.
     """
     method = find_method(chunk.method)
@@ -223,12 +230,13 @@ def _side_by_side(chunk: Chunk, scenes: Sequence[Scene]) -> Rows:
     block = method.solve_many(scenes, settings)
     checked_result(block, RunBlock, "solve_many", method.solve_many, method.name)
     found = block.quantities
-    kinetic, work = found["kinetic_energy"], found["work"]  # which a sweep's scenes ask for
+    kinetic, work = found["kinetic_energy"], found["work"]  # every scene of a sweep requests them
     errors = energy_balance(kinetic, found["potential_energy"], work)
     drifts = energy_drifts(scenes, kinetic, work, errors)
     angles = largest(found["angles"].reshape(len(scenes), -1))
-    # Metrics that decide whether a run is clearly ok. Without defects it is the energy alone: runs
-    # side by side are the closed form itself, and their defects cost ten times as much as the runs.
+    # Metrics that decide whether a run is clearly ok. By default only the energy drift decides: the
+    # built-in method with `solve_many` integrates the closed form itself, and computing the defects
+    # takes ten times as long as the runs.
     of_runs: list[Metrics] = []
     for i, scene in enumerate(scenes):
         defects = defects_of(scene, block.trajectory(i)) if chunk.with_defects else None
@@ -243,7 +251,8 @@ def _side_by_side(chunk: Chunk, scenes: Sequence[Scene]) -> Rows:
     for name in row.names or ():
         if name not in rows:
             values = errors if name == "energy_error" else block.quantities.get(name)
-            # quantities of plug-ins are computed run by run; NaN after a run broke off
+            # Quantities of other packages are computed run by run. Samples after an early end are
+            # NaN.
             if values is None:
                 runs = enumerate(scenes)
                 made = [
@@ -280,30 +289,31 @@ def _side_by_side(chunk: Chunk, scenes: Sequence[Scene]) -> Rows:
     return rows
 
 
-# Number of runs in a chunk where the method computes many side by side: an eighth of a second of
-# work by the fastest one, fewer towards the end, so that all workers end together. The smallest
-# number fills the vector lanes of any processor.
+# Limits of a chunk whose method computes many runs side by side. The maximum number of runs takes
+# the fastest method an eighth of a second. The number of runs is a multiple of the minimum, which
+# fills the vector lanes of any processor. The last limit is the size of the chunk's rows in bytes.
 _MAX_RUNS = 128
 _MIN_RUNS = 8
 _CHUNK_BYTES = 1 << 23
 
 
-# From (runs stored, runs in all, statuses of those that have just been stored).
+# Function that is called with the number of runs stored so far, the number of runs of the plan, and
+# the counts by status of the runs that have just ended.
 OnProgress = Callable[[int, int, Counter[str]], None]
 
 
 @dataclass(frozen=True)
 class SweepPlan:
-    """Hold the runs first <= r < last of a sweep, by its methods.
+    """Hold the runs with the numbers first <= r < last of a sweep.
 
     Run r is row r mod `rows` of the design, by method number r div `rows`.
 
     Attributes
     ----------
     sweep, methods : the sweep, and the names of the methods that can represent its base scene.
-    settings : for each method, those of the sweep that it has.
-    first, last : numbers of runs.
-    time_limit_s : s, of each run.
+    settings : by method, those settings of the sweep that the method has.
+    first, last : number of the first run, and of the run after the last.
+    time_limit_s : time limit of each run, s.
     refused : the methods that were left out.
     """
 
@@ -322,28 +332,30 @@ class SweepPlan:
 
     @property
     def rows(self) -> int:
-        """Return the number of rows of the design, which each method computes."""
+        """Return the number of rows of the design: runs of the whole sweep by each method."""
         return self.sweep.design.count
 
     def table(self) -> TableSpec:
-        """Return the specification of the table of its runs."""
+        """Return the specification of the table that holds the runs of the plan."""
         return sweep_table(self.sweep, self.methods, range(self.first, self.last))
 
     def chunks(
         self, place: RowLocation, gaps: Sequence[tuple[int, int]], workers: int = 1
     ) -> Iterator[Chunk]:
-        """Yield the runs of `gaps` as chunks, each by one method.
+        """Divide the missing runs into chunks, each by one method, and yield the chunks.
+
+        Chunks become smaller towards the end, so that all workers end at about the same time.
 
         Parameters
         ----------
         place : location of the plan's first run in the file.
-        gaps : (first, last) numbers of runs that are missing, `last` not included.
+        gaps : (first, last) numbers of missing runs; `last` is the run after the last one.
         workers : number of processes among which the runs are shared.
 
         Raises
         ------
         TableError
-            If the first row of the first gap makes no scene.
+            If the values of the first missing run do not make a valid scene.
         """
         variants, design = self.sweep.variants(), self.sweep.design
         for first, _ in gaps[:1]:
@@ -378,7 +390,7 @@ class SweepPlan:
     def attributes(self) -> dict[str, object]:
         """Return the attributes of the sweep's file, by name.
 
-        The digest under IDENTITY covers everything that decides which runs the file holds.
+        The digest under IDENTITY covers everything that determines the runs and their arrays.
         """
         sweep, table = self.sweep, self.sweep.design
         options = [
@@ -428,19 +440,22 @@ def plan_sweep(
     part: tuple[int, int] = (1, 1),
     time_limit_s: float = 60.0,
 ) -> SweepPlan:
-    """Return the runs of a part of a sweep, by the methods that can represent its base scene.
+    """Return the plan of a part of a sweep.
+
+    Methods that cannot represent the base scene of the sweep are left out.
 
     Parameters
     ----------
-    sweep : as read from its file.
-    methods : names; those of the sweep's file if there are none, or else the default one.
-    part : (k, n) for part k of n.
+    sweep : the sweep, as read from its file.
+    methods : names of methods; if empty, those of the sweep's file; if it has none, the default
+        method.
+    part : (k, n) for part k of n, k from 1.
     time_limit_s : time limit of a run in s.
 
     Raises
     ------
     InputError
-        For unknown methods and settings.
+        If a method is unknown, or no method has one of the settings.
     MethodRefusal
         If all methods refuse the base scene.
     """
@@ -459,21 +474,23 @@ def plan_sweep(
 
 @dataclass(frozen=True)
 class SweepResult:
-    """Hold the outcome of a sweep that is complete, except for runs that were lost or refused.
+    """Hold the outcome of a call that computes the missing runs of a sweep.
+
+    Afterwards all runs of the plan are stored, except those that were lost or refused.
 
     Attributes
     ----------
-    path : the dataset.
+    path : path of the dataset.
     runs, made : number of runs of the plan, and of those computed by this call.
-    statuses : number of runs in the dataset with each status.
-    seconds : s, taken by this call.
-    is_ok : whether no method was refused, and every run is ok whose method claims the correct
-        equations.
-    lost : a line for each run whose process died or could not start, also when it was tried alone;
-        it is not stored.
-    older : number of stored runs that other versions computed.
-    refused : a line for each method and reason; runs that the method cannot represent are not
-        stored.
+    statuses : number of stored runs with each status.
+    seconds : duration of this call, s.
+    is_ok : whether nothing was refused, and every run of a method with the corrected equations is
+        ok.
+    lost : a line for each run that is not stored because its process died or could not start, also
+        when the run was tried alone.
+    older : number of stored runs that were computed by other versions.
+    refused : a line for each method and reason. The method cannot represent the base scene, or the
+        scenes of some runs, which are not stored.
     """
 
     path: Path
@@ -496,22 +513,25 @@ def run_sweep(
     *,
     fresh: bool = False,
 ) -> SweepResult:
-    """Compute the runs that `output` lacks; an interrupted call can be repeated and continues.
+    """Compute the runs of a plan that a dataset lacks, and store them in it.
+
+    After an interruption, a repeated call continues with the runs that are still missing.
 
     Parameters
     ----------
-    plan : the runs.
-    output : the dataset.
-    pool : worker processes.
-    on_progress : called when runs have been stored, first with those that were there.
-    fresh : whether runs that are stored are computed again.
+    plan : the plan of the runs.
+    output : path of the dataset; it is created if it does not exist.
+    pool : pool of worker processes.
+    on_progress : called once with the number of runs that are already stored, then after each
+        chunk.
+    fresh : whether runs that are already stored are computed again.
 
     Raises
     ------
     InputError, MethodRefusal
-        If the sweep cannot be done, or `output` is a different file.
+        If the sweep cannot be computed, or `output` is not a dataset of this sweep.
     StoreError
-        If `output` cannot be written; what was stored stays.
+        If `output` cannot be written; runs that are stored already remain.
     """
     start = time.monotonic()
     opened = open_sweep(output, plan.table(), plan.attributes(), plan.time_limit_s, fresh=fresh)
@@ -524,7 +544,7 @@ def run_sweep(
         is_older = stored.column("code") != now[np.arange(plan.first, plan.last) // plan.rows]
         older = int((is_older & (statuses != MISSING)).sum())
         on_progress(done, plan.runs, Counter())
-        # First and last of every span of missing runs.
+        # The first number of every span of missing runs, and the number after its last one.
         edges = plan.first + np.flatnonzero(
             np.diff(statuses == MISSING, prepend=False, append=False)
         )
@@ -532,7 +552,7 @@ def run_sweep(
         for end in run_tasks(pool, plan.chunks(place, gaps, pool.workers)):
             chunk = end.task
             assert isinstance(chunk, Chunk)
-            if end.value is None:  # nothing is known of these runs: they stay missing
+            if end.value is None:  # the runs have no rows, and stay missing
                 runs = range(chunk.first, chunk.first + len(chunk.values))
                 if end.failure == REFUSED:
                     refused.setdefault((chunk.method, end.message), []).extend(runs)
@@ -569,5 +589,5 @@ def run_sweep(
 
 
 def _counted(statuses: NDArray[np.int8]) -> Counter[str]:
-    """Return the number of runs with each status, without missing ones."""
+    """Return the number of runs with each status; missing runs are not counted."""
     return Counter(STATUSES[code] for code in statuses.tolist() if code != MISSING)

@@ -1,9 +1,10 @@
-"""Metadata of a sweep's dataset for other users: Croissant, and a folder for `datasets`.
+"""Files for the publication of a sweep's dataset.
 
-    STEM.croissant.json        the variables of the dataset, with types and units
-    FOLDER/train.h5 ...        the runs of each split, and FOLDER/README.md, the dataset card, which
-                               names them
-No licence is named: whoever publishes a dataset chooses one.
+    STEM.croissant.json   Croissant metadata: the variables of the dataset, with types and units
+    FOLDER/train.h5 ...   a file with the runs of each split, for the library `datasets`
+    FOLDER/README.md      the dataset card, which names the files of the splits
+
+The files name no licence: the publisher of the dataset chooses one.
 """
 
 from __future__ import annotations
@@ -25,7 +26,8 @@ from rotor_mbs.runs.trailer import SPLIT_OF, may_extend
 from rotor_mbs.scenario.sweep import SPLITS
 from rotor_mbs.solution.status import STATUSES
 
-# Patterns that every file of a kind contains, by which an earlier output is recognized.
+# Patterns that every Croissant file and every dataset card of this module contain. A file without
+# the pattern is not an earlier output, and is not replaced.
 _CROISSANT = rb'"conformsTo": "http://mlcommons.org/croissant/1.0"[^\0]*"Euler-Lagrange equations"'
 _CARD = rb"\A---\npretty_name: [^\0]*Euler-Lagrange equations"
 _TEMPLATES = jinja2.Environment(
@@ -60,27 +62,28 @@ def describe(path: Path | str) -> Path:
 def write_splits(path: Path | str, folder: Path) -> list[Path]:
     """Write a dataset as a folder for `datasets.load_dataset(folder)` of Hugging Face.
 
-    That reader takes each variable of an HDF5 file as a column, and needs the same number of rows
-    in all of them: each split is a file of its own, without the scales except the time, which is
-    repeated in every row. Runs that are missing are left out; those that failed have their status.
-    A split is held in memory while it is written.
+    `load_dataset` reads each variable of an HDF5 file as a column, and all columns must have the
+    same number of rows. Therefore each split is a separate file, and its scales are left out. Only
+    the time is kept, repeated in every row. Missing runs are left out; runs that failed are
+    written, with their status. Each file is made in memory.
 
     Parameters
     ----------
-    path : a sweep's dataset.
-    folder : made where it does not exist; its files are replaced where they are earlier ones of
-        this function.
+    path : path of a sweep's dataset.
+    folder : folder for the files, created if it does not exist. Earlier outputs of this function
+        are replaced.
 
     Returns
     -------
     list of Path
-        A file for each split that has runs, "train.h5" where runs are not marked, then the card.
+        A file for each split that has runs, then the dataset card. If the dataset has no splits,
+        all runs are in "train.h5".
 
     Raises
     ------
     StoreError, InputError
-        If `path` is not a sweep's dataset, or a file cannot be written, or is not an earlier
-        output.
+        If `path` is not a sweep's dataset, if a file cannot be written, or if a file exists that is
+        not an earlier output.
     """
     stored = StoredSweep(Path(path))
     columns = _of_runs(stored)
@@ -96,12 +99,12 @@ def write_splits(path: Path | str, folder: Path) -> list[Path]:
         with new_file(files[-1], kind) as file:
             for name, column in columns.items():
                 values = stored.column(name)[rows]
-                if values.dtype.kind == "S":  # a text is one value there
+                if values.dtype.kind == "S":  # characters are joined: one value a row
                     values = np.ascontiguousarray(values).view(f"S{values.shape[1]}")[:, 0]
                 variable = file.create_dataset(name, data=values)
                 variable.attrs.update(units=column.units, long_name=column.long_name)
             if "time" in stored.columns:
-                # The reader has no scales: each row has the times of its samples.
+                # `load_dataset` knows no scales, so each row has the times of its samples.
                 time = np.broadcast_to(
                     stored.column("time"), (len(rows), len(stored.column("time")))
                 )
@@ -120,7 +123,7 @@ def write_splits(path: Path | str, folder: Path) -> list[Path]:
 
 
 def _of_runs(stored: StoredSweep) -> dict[str, Column]:
-    """Return the variables with a value for each run, by name."""
+    """Return the columns that have a value for each run, by name."""
     return {
         name: column for name, column in stored.columns.items() if column.dimensions[0] == "run"
     }
