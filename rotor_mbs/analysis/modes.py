@@ -1,14 +1,17 @@
-"""Modes of linearized equations of a scene over rotor speed.
+"""Modes of the linearized equations of a scene over rotor speed.
 
-They have frequencies, damping ratios, shapes in multiblade coordinates and Floquet multipliers, as
-arrays, as text, and as records of a results file.
+This module computes frequencies, damping ratios, shapes in multiblade coordinates and Floquet
+multipliers from stiffness, damping and transition matrices. It returns them as arrays, as text, and
+as records of a file of modes.
 
 Symbols: λ eigenvalue (1/s) of d/dt (δq, δq̇); ω0 = |λ| undamped and ωd = |Im λ| damped frequency
 (rad/s), ζ = -Re λ / ω0 damping ratio; μ Floquet multiplier.
 
-/modes/<scene>/<model>/rest        equilibrium under gravity, one row of `speed`
-/modes/<scene>/<model>/rotation    steady rotation without gravity: the Campbell diagram
-/modes/<scene>/lagrange/floquet    multipliers of a turn under gravity
+The records of a file, by path:
+
+/modes/<scene>/<model>/rest        modes at rest under gravity, with the single speed 0
+/modes/<scene>/<model>/rotation    modes in steady rotation without gravity (Campbell diagram)
+/modes/<scene>/lagrange/floquet    Floquet multipliers of a turn under gravity
 """
 
 from __future__ import annotations
@@ -41,23 +44,26 @@ from rotor_mbs.solution.trajectory import Array
 
 Complex = NDArray[np.complex128]
 
-# A multiplier this much above 1 counts as growth: those of equal blades coincide, and rounding
-# splits a double eigenvalue by the root of 1e-16 and more.
+# A multiplier counts as growth if it exceeds 1 by more than this. Equal blades have equal
+# multipliers, and rounding splits a double eigenvalue by the square root of 1e-16 and more.
 GROWTH = 1e-5
-# Share of the largest entry of a matrix below which an entry changes no eigenvalue by as much as
-# models may differ: its root is a hundredth of that.
+# Entries of a matrix below this share of its largest entry are set to zero. Such an entry changes
+# an eigenvalue by at most the square root of the share, 1e-10, a hundredth of AGREEMENT.
 _REMAINDER = 1e-20
 
 
 @dataclass(frozen=True)
 class ModeSet:
-    """Hold n modes of one speed, or of several, whose number then comes first in every array.
+    """Hold n modes at one speed, or at several speeds.
+
+    With several speeds, the first axis of every array is the speed.
 
     Attributes
     ----------
-    eigenvalues : (..., n, 2) 1/s, both of each mode, conjugate where it oscillates.
-    shapes : (..., n, n), a row for each mode: rotor and pitch amplitudes, the largest one 1.
-    names : of the modes where symmetry distinguishes them, else ().
+    eigenvalues : (..., n, 2) 1/s, the two eigenvalues of each mode; they are conjugate if the mode
+        oscillates.
+    shapes : (..., n, n), a row for each mode: amplitudes of rotor and pitches, the largest is 1.
+    names : names of the modes if symmetry distinguishes them, else ().
     """
 
     eigenvalues: Complex
@@ -66,23 +72,25 @@ class ModeSet:
 
     @property
     def undamped_frequencies(self) -> Array:
-        """Return the undamped frequencies, (..., n) rad/s: root of the product of both eigenvalues.
+        """Return the undamped frequencies, (..., n) rad/s.
 
-        NaN where one of them grows without oscillating.
+        The undamped frequency is the square root of the product of both eigenvalues. It is NaN if
+        the product is negative: then both are real, and one of them is positive.
         """
         product = (self.eigenvalues[..., 0] * self.eigenvalues[..., 1]).real
         return np.sqrt(np.where(product >= 0.0, np.abs(product), np.nan))
 
     @property
     def damped_frequencies(self) -> Array:
-        """Return the damped frequencies, (..., n) rad/s; 0 where the mode does not oscillate."""
+        """Return the damped frequencies, (..., n) rad/s; 0 if the mode does not oscillate."""
         return np.asarray(np.abs(self.eigenvalues[..., 0].imag))
 
     @property
     def damping_ratios(self) -> Array:
-        """Return the damping ratios, (..., n), above 1 if overdamped.
+        """Return the damping ratios, (..., n).
 
-        NaN where the undamped frequency is 0 or NaN.
+        The ratio is above 1 if the mode is overdamped, and NaN if its undamped frequency is 0 or
+        NaN.
         """
         frequencies = self.undamped_frequencies
         rate = -0.5 * self._real_parts.sum(axis=-1)
@@ -93,14 +101,18 @@ class ModeSet:
 
     @property
     def growth_rates(self) -> Array:
-        """Return the larger real part of each mode, (..., n) 1/s; above 0 it is unstable."""
+        """Return the growth rates, (..., n) 1/s; above 0 the mode is unstable.
+
+        The growth rate is the larger real part of the two eigenvalues.
+        """
         return np.asarray(self._real_parts.max(axis=-1) + 0.0)
 
     @property
     def _real_parts(self) -> Array:
         """Return the real parts of the eigenvalues, (..., n, 2) 1/s.
 
-        They are 0 where they are below the precision of the eigenvalue, as -1e-100 beside 1 rad/s.
+        A real part is set to 0 if it is below the precision of the eigenvalue, such as -1e-100 for
+        an eigenvalue of size 1.
         """
         is_rounding = np.abs(self.eigenvalues.real) <= np.finfo(float).eps * np.abs(
             self.eigenvalues
@@ -111,14 +123,14 @@ class ModeSet:
 def multiblade(blades: int) -> tuple[tuple[str, ...], Array]:
     """Return the names of the multiblade (Coleman) coordinates, and their matrix.
 
-    The matrix, (blades, blades), gives the blades' pitches from these coordinates:
+    The matrix, (blades, blades), transforms multiblade coordinates into the pitches of the blades:
     pitch of blade i = collective + Σ_k (cosine_k cos k ψ_i + sine_k sin k ψ_i) [+ differential
     (-1)^(i-1)], with the blade's mounting angle ψ_i = 2π(i-1)/blades. Source: R. P. Coleman, A. M.
     Feingold, NACA Report 1351, 1958.
 
     Parameters
     ----------
-    blades : number of blades; the differential coordinate exists if it is even.
+    blades : number of blades; the differential coordinate exists if the number is even.
     """
     psi = 2.0 * np.pi * np.arange(blades) / blades
     names, columns = ["collective"], [np.ones(blades)]
@@ -133,7 +145,7 @@ def multiblade(blades: int) -> tuple[tuple[str, ...], Array]:
 
 
 def multiblade_shapes(shapes: Complex) -> Complex:
-    """Return amplitudes of rotor and multiblade coordinates, (..., 1 + blades).
+    """Transform mode shapes into amplitudes of rotor and multiblade coordinates, (..., 1 + blades).
 
     Parameters
     ----------
@@ -151,43 +163,44 @@ def modes_of(
     is_cyclic: bool,
     rounding: float = 0.0,
 ) -> ModeSet:
-    """Return all modes of δq̈ + damping δq̇ + stiffness δq = 0 by undamped frequency.
+    """Return the n modes of δq̈ + damping δq̇ + stiffness δq = 0, sorted by undamped frequency.
 
     Parameters
     ----------
     stiffness, damping : ndarray
-        (n, n), 1/s² and 1/s, rotor first among the coordinates.
+        (n, n), 1/s² and 1/s; the rotor is the first coordinate.
     is_cyclic : bool
-        Whether nothing depends on the rotor's angle (no gravity): it is left out, and its mode has
-        an eigenvalue of exactly 0.
+        Whether nothing depends on the rotor angle (no gravity). Then the rotor angle is left out of
+        the equations, and the rotor's mode has an eigenvalue of exactly 0.
     rounding : float
-        1/s², a stiffness that is rounding of larger numbers: an eigenvalue that follows from it is
-        0.
+        Rounding error of the stiffness, 1/s². An eigenvalue is set to 0 if its squared modulus is
+        not larger.
     """
     n = len(stiffness)
-    # Remainders of differences, as 1e-160 beside 1: LAPACK scales rows until their sizes are equal,
-    # and a shape would consist of their rounding.
+    # Differences of nearly equal numbers leave remainders, such as 1e-160 beside 1. They are set to
+    # zero: LAPACK scales rows to equal sizes, so that a shape would consist of such remainders.
     size = np.abs(stiffness).max(initial=0.0)
     stiffness = np.where(np.abs(stiffness) < _REMAINDER * size, 0.0, stiffness)
     size = max(float(np.abs(damping).max(initial=0.0)), math.sqrt(size))
     damping = np.where(np.abs(damping) < _REMAINDER * size, 0.0, damping)
-    # The equations of first order, of the positions and then the rates; without the rotor's angle,
-    # which is the first coordinate, where nothing depends on it.
+    # The matrix of the equations of first order, for positions and then rates. Its first row and
+    # column, those of the rotor angle, are left out if nothing depends on this angle.
     matrix = np.block([[np.zeros((n, n)), np.eye(n)], [-stiffness, -damping]])
     first = 1 if is_cyclic else 0
     values, vectors = np.linalg.eig(matrix[first:, first:])
     rounding = max(rounding, 4e-16 * n * np.abs(stiffness).max(initial=0.0))
     values = np.where(np.abs(values) ** 2 <= rounding, 0.0, values).astype(complex)
-    # rounding of undamped modes
+    # The real part of an undamped mode is rounding.
     values.real[np.abs(values.real) < 1e-14 * np.abs(values).max(initial=0.0)] = 0.0
     shapes = []
     for vector in vectors.T:
         positions, rates = vector[: n - first], vector[n - first :]
-        # Rates are λ times the positions: of an eigenvalue near 0 they are rounding. Otherwise they
-        # have the rotor's amplitude, too, where its angle is left out.
+        # The rates of an eigenvector are λ times the positions. They are taken as the shape,
+        # because they include the rotor even if its angle is left out. For an eigenvalue near 0
+        # the rates are rounding, and the positions are taken.
         slow = np.linalg.norm(rates) <= 1e-7 * np.linalg.norm(positions)
         shapes.append(_normalized(np.concatenate([np.zeros(first), positions]) if slow else rates))
-    # Both eigenvalues of each mode, and its shape.
+    # Each mode that oscillates: its two eigenvalues, and its shape.
     pairs = [
         ((value, value.conjugate()), shapes[k])
         for k, value in enumerate(values)
@@ -199,14 +212,16 @@ def modes_of(
     if is_cyclic:
         slowest = single.pop(0)
         pairs.append(((values[slowest], 0j), shapes[slowest]))
-    # Real eigenvalues, from the largest on: each is paired with that of the most similar shape.
+    # Two real eigenvalues make a mode. Beginning with the largest, each real eigenvalue is paired
+    # with the one whose shape is most similar.
     while single:
         last = single.pop()
         partner = max(
             single, key=lambda k: float(_assurance(shapes[last][None], shapes[k][None])[0, 0])
         )
         single.remove(partner)
-        # The growing one first, in every model: `in_order_of` compares first eigenvalues, too.
+        # The larger of the two real eigenvalues is the first of the mode. The order must be the
+        # same in all models, because `in_order_of` compares the first eigenvalues.
         growing, decaying = sorted((values[last], values[partner]), key=lambda value: -value.real)
         pairs.append(((growing, decaying), shapes[partner]))
     modes = ModeSet(
@@ -220,8 +235,9 @@ def modes_of(
 def isotropic_modes(stiffness: Array, damping: Array) -> ModeSet:
     """Return the modes of a rotor of equal blades without gravity, with their names.
 
-    The rotor comes first, then one mode for each multiblade coordinate. These coordinates split the
-    equations exactly: rotor and collective pitch together, and each of the others alone.
+    The mode of the rotor comes first, then the mode of each multiblade coordinate. In multiblade
+    coordinates the equations of such a rotor are decoupled, except for those of rotor and
+    collective pitch, which are coupled to each other.
 
     Parameters
     ----------
@@ -240,12 +256,13 @@ def isotropic_modes(stiffness: Array, damping: Array) -> ModeSet:
         list(together.eigenvalues),
         [np.append(shape, np.zeros(n - 2)) for shape in together.shapes],
     )
-    # pitch slower than the rotor's decay
+    # `modes_of` sorts by frequency: the mode of the collective pitch is first if it is slower than
+    # the decay of the rotor. Then both modes are exchanged.
     if abs(shapes[0][0]) < abs(shapes[1][0]) and abs(shapes[0][1]) > 0.0:
         values.reverse()
         shapes.reverse()
     for i in range(2, n):
-        # Each further coordinate is an oscillator of its own: λ² + D λ + K = 0.
+        # Each further coordinate is a separate oscillator: λ² + D λ + K = 0.
         root = np.sqrt(complex((0.5 * D[i, i]) ** 2 - K[i, i]))
         values.append(np.array([-0.5 * D[i, i] + root, -0.5 * D[i, i] - root]))
         shapes.append(np.eye(n, dtype=complex)[i])
@@ -255,11 +272,11 @@ def isotropic_modes(stiffness: Array, damping: Array) -> ModeSet:
 
 
 def track(sets: Sequence[ModeSet]) -> list[ModeSet]:
-    """Put the same modes in the same places at every speed.
+    """Return the modes at all speeds, sorted so that a mode has the same place at every speed.
 
     Parameters
     ----------
-    sets : one for each speed; each is put in the order of the one before it.
+    sets : the modes at each speed. They are put in the order of the modes at the speed before.
     """
     out = list(sets[:1])
     for each in sets[1:]:
@@ -268,14 +285,14 @@ def track(sets: Sequence[ModeSet]) -> list[ModeSet]:
 
 
 def in_order_of(first: ModeSet, other: ModeSet) -> ModeSet:
-    """Return the modes of `other` in the places of those of `first` that they are most like.
+    """Return the modes of `other`, sorted so that each is in the place of the like mode of `first`.
 
-    Likeness of two modes: the modal assurance criterion |φ·ψ*|² / (|φ|² |ψ|²), less their relative
-    distance.
+    The likeness of two modes is the modal assurance criterion |φ·ψ*|² / (|φ|² |ψ|²) minus the
+    distance of their first eigenvalues, as a share of the largest eigenvalue.
 
     Parameters
     ----------
-    first, other : sets of the same number of modes, each of one speed.
+    first, other : two sets with the same number of modes, each at one speed.
     """
     from scipy.optimize import linear_sum_assignment
 
@@ -284,7 +301,7 @@ def in_order_of(first: ModeSet, other: ModeSet) -> ModeSet:
     size = max(float(np.abs(other.eigenvalues).max()), 1e-300)
     likeness = _assurance(first.shapes, other.shapes)
     likeness -= np.abs(first.eigenvalues[:, None, 0] - other.eigenvalues[None, :, 0]) / size
-    # One to one, so that the sum of all likenesses is largest.
+    # Modes are assigned one to one, so that the sum of all likenesses is largest.
     order = linear_sum_assignment(-likeness)[1]
     return ModeSet(other.eigenvalues[order], other.shapes[order])
 
@@ -292,17 +309,19 @@ def in_order_of(first: ModeSet, other: ModeSet) -> ModeSet:
 def floquet(
     transition: Array, flow: Array, gradient: Array, speed: float
 ) -> tuple[Complex, Complex]:
-    """Return the multipliers of a turn: all, and those that are not 1 in every such motion.
+    """Return the Floquet multipliers of a turn: all of them, and those that are not always 1.
 
-    Both are sorted, the largest modulus first. The motion is stable where none of the latter is
-    larger than 1, up to `GROWTH`.
+    Every periodic motion has a multiplier 1, and a motion with a conserved quantity has a second
+    one. The motion is stable if no other multiplier has a modulus above 1, up to `GROWTH`. Both
+    arrays are sorted by modulus, the largest first.
 
     Parameters
     ----------
     transition : (2n, 2n) state transition matrix over the turn.
-    flow : (2n,) time derivative of the state, an eigenvector for 1.
-    gradient : (2n,) derivative of what the motion keeps, a left eigenvector for 1, or zeros.
-    speed : rad/s, scale of the rates.
+    flow : (2n,) time derivative of the state; it is an eigenvector of the multiplier 1.
+    gradient : (2n,) derivative of the conserved quantity with respect to the state; it is a left
+        eigenvector of the multiplier 1. Zeros if nothing is conserved.
+    speed : rotor speed, rad/s, by which rates are divided.
     """
     if not np.isfinite(transition).all():
         nothing = np.full(len(transition), complex(np.nan, np.nan))
@@ -313,8 +332,9 @@ def floquet(
     fixed = [flow / units, gradient * units]
     fixed = [vector / np.linalg.norm(vector) for vector in fixed if np.any(vector)]
     basis, _ = np.linalg.qr(np.column_stack(fixed), mode="complete")
-    # The space orthogonal to both. The hyperplane normal to `gradient` is mapped into itself and
-    # contains `flow`: without the direction of `flow` it has the other multipliers.
+    # `rest` spans the space orthogonal to `flow` and `gradient`. The hyperplane orthogonal to
+    # `gradient` is mapped into itself, and it contains `flow`. Projected onto `rest`, without the
+    # direction of `flow`, the map has all other multipliers.
     rest = basis[:, len(fixed) :]
     values = np.linalg.eigvals(scaled).astype(complex)
     others = np.linalg.eigvals(rest.T @ scaled @ rest).astype(complex)
@@ -322,57 +342,59 @@ def floquet(
 
 
 def _normalized(shape: Complex | Array) -> Complex:
-    """Return a shape divided by its largest entry; a shape of zeros stays."""
+    """Return a shape divided by its largest entry; a shape of zeros is not changed."""
     largest = shape[int(np.argmax(np.abs(shape)))]
     return np.asarray(shape / largest if largest != 0.0 else shape, dtype=complex)
 
 
 def _assurance(first: Complex, second: Complex) -> Array:
-    """Return the modal assurance criterion between the rows of both, (n, m)."""
+    """Return the modal assurance criterion of each shape (row) of `first` and `second`, (n, m)."""
     product = np.abs(first.conj() @ second.T) ** 2
     sizes = np.outer((np.abs(first) ** 2).sum(axis=1), (np.abs(second) ** 2).sum(axis=1))
     return np.asarray(product / np.maximum(sizes, 1e-300))
 
 
 REST, ROTATION = "rest", "rotation"
-CLOSED_FORM = "lagrange"  # the source that others are compared with
-FLOQUET = f"{CLOSED_FORM}/floquet"  # name of a record
-# Sources agree where their eigenvalues differ by no more than this share of the largest one.
+CLOSED_FORM = "lagrange"  # the model with which the other models are compared
+FLOQUET = f"{CLOSED_FORM}/floquet"  # name of the record with the Floquet multipliers
+# Models agree if their eigenvalues differ by at most this share of the largest eigenvalue.
 AGREEMENT = 1e-8
-# Share to which the modes of a source satisfy its own equations: six digits are printed.
+# Largest relative residual of a model's modes in its own equations: six digits are printed.
 PRINTED_PRECISION = 1e-6
-_NOTE_WIDTH = 130  # characters, of a summary's lines: as wide as its table
-# Of a rotor that no drive holds: what `rotor` and the collective mode are.
+_NOTE_WIDTH = 130  # line width of notes in a summary, in characters: as wide as its table
+# Explanation in a summary of the modes `rotor` and `collective` of a rotor that no drive holds.
 _FREE_SHAFT = (
     "the shaft is free: `rotor` turns all blades together, and the collective pitch moves the "
     "rotor, too (rotor/pitch); a whirl moves no rotor"
 )
-_SHOWN_ROWS = 24  # of a summary: three states of eight modes
-# Eigenvalues below this share of the largest are not compared themselves: they are square roots of
-# the small difference of stiffnesses, which is rounding where nothing holds the rotor. Their
-# residuals are compared, which no root magnifies.
+_SHOWN_ROWS = 24  # maximum number of table rows in a summary: three states with eight modes
+# Eigenvalues below this share of the largest eigenvalue are not compared directly. They are square
+# roots of a small difference of stiffnesses; if nothing holds the rotor, the difference is
+# rounding, and the root magnifies it. Residuals, which are not magnified, are compared instead.
 _SLOW = 1e-3
-# Share of the equations' terms below which a singular vector counts as a shape of an eigenvalue.
+# A singular vector counts as a shape of an eigenvalue if its singular value is below this share of
+# the terms of the equations.
 _NO_FORCE = 1e-10
 
 
 @dataclass(frozen=True, kw_only=True)
 class LinearModes(ModeSet):
-    """Hold the modes of one source over speed, the same mode in the same place at every speed.
+    """Hold the modes of one model over speed; a mode has the same place at every speed.
 
     Attributes
     ----------
-    names : "collective pitch" where symmetry distinguishes the modes, else "mode 2".
+    names : names of the modes, such as "collective pitch" if symmetry distinguishes the modes, or
+        else "mode 2".
     source, label : name of the model, and its label for readers.
     kind : REST or ROTATION.
     blades : number of blades.
-    speeds : (speeds,) rad/s.
+    speeds : (speeds,) rotor speeds, rad/s.
     coordinates : names of the n coordinates that move.
-    angles : (speeds, n) rad, steady values of the `coordinates`.
-    stiffness, damping : (speeds, n, n) 1/s² and 1/s, the mass matrix divided out.
-    weights : 1/s², moments of all weights about the shaft divided by the inertia, of which the
-        stiffness of a balanced rotor is rounding.
-    messages : for each speed why there are no modes, or "".
+    angles : (speeds, n) rad, values of the `coordinates` at the steady state.
+    stiffness, damping : (speeds, n, n) 1/s² and 1/s, multiplied by the inverse mass matrix.
+    weights : 1/s², moments of all weights about the shaft, divided by the rotor's inertia. In a
+        balanced rotor the moments cancel, and the remaining stiffness is rounding of this number.
+    messages : for each speed the reason why there are no modes; "" if there are.
     """
 
     source: str
@@ -391,22 +413,23 @@ class LinearModes(ModeSet):
     def residual(self) -> float:
         """Return the largest residual of (λ² + λ damping + stiffness) φ = 0 over all modes.
 
-        It is divided by the size of the terms. The modes of equal blades are computed as if no
-        blade differed, and those without gravity as if nothing depended on the rotor's angle:
-        matrices for which that is false have a residual.
+        Each residual is divided by the size of the terms. A residual that is not small shows that
+        an assumption is wrong with which the modes were computed: that all blades are equal, or
+        that without gravity nothing depends on the rotor angle.
         """
         largest = 0.0
         for i in range(len(self.speeds)):
             if not np.isfinite(self.stiffness[i]).all():
                 continue
             for values, shape in zip(self.eigenvalues[i], self.shapes[i], strict=True):
-                # The shape is that of both where they are conjugate, else of one of them.
+                # The stored shape belongs to one of the two eigenvalues, so the smaller residual
+                # counts.
                 residuals = [self.residual_of(i, value, shape) for value in values.tolist()]
                 largest = max(largest, min(residuals))
         return largest
 
     def residual_of(self, i: int, value: complex, shape: Complex) -> float:
-        """Return the residual of one eigenvalue with a shape, see `residual`.
+        """Return the relative residual of an eigenvalue and a shape, see `residual`.
 
         Parameters
         ----------
@@ -419,9 +442,7 @@ class LinearModes(ModeSet):
         return float(np.linalg.norm(force) / (np.linalg.norm(shape) * self._terms(i, value)))
 
     def shapes_of(self, i: int, value: complex) -> Complex:
-        """Return all shapes of an eigenvalue, one in each row.
-
-        They are computed from the whole matrices.
+        """Compute all shapes of an eigenvalue from the full matrices, one in each row.
 
         Parameters
         ----------
@@ -432,12 +453,12 @@ class LinearModes(ModeSet):
         _, sizes, vectors = np.linalg.svd(
             value * value * np.eye(n) + value * self.damping[i] + self.stiffness[i]
         )
-        # An eigenvalue makes the matrix singular: its shapes are the null space, up to rounding.
+        # For an eigenvalue this matrix is singular. Its null space, up to rounding, has the shapes.
         is_shape = sizes <= max(10.0 * sizes[-1], _NO_FORCE * self._terms(i, value))
         return np.asarray(vectors[is_shape].conj())
 
     def _terms(self, i: int, value: complex) -> float:
-        """Return the size of the equations' terms for an eigenvalue, 1/s²."""
+        """Return the size of the terms in the equations for an eigenvalue, 1/s²."""
         stiffness, damping = (
             np.abs(matrix[i]).max(initial=0.0) for matrix in (self.stiffness, self.damping)
         )
@@ -445,7 +466,10 @@ class LinearModes(ModeSet):
 
     @property
     def whole_shapes(self) -> Complex:
-        """Return the shapes by rotor and blade, (speeds, n, 1 + blades); 0 where none moves."""
+        """Return the amplitudes of the rotor and all pitches, (speeds, n, 1 + blades).
+
+        A pitch that does not move has the amplitude 0.
+        """
         whole = np.zeros((len(self.speeds), len(self.coordinates), 1 + self.blades), dtype=complex)
         columns = [
             0 if name == "rotor" else int(name.rpartition(" ")[2]) for name in self.coordinates
@@ -455,26 +479,26 @@ class LinearModes(ModeSet):
 
     @property
     def multiblade_shapes(self) -> Complex:
-        """Return the shapes by rotor and multiblade coordinate, (speeds, n, 1 + blades)."""
+        """Return the amplitudes of rotor and multiblade coordinates, (speeds, n, 1 + blades)."""
         return multiblade_shapes(self.whole_shapes)
 
     @property
     def nodal_diameters(self) -> NDArray[np.int64]:
-        """Return the nodal diameters of each mode, (n,); -1 where its shape has several."""
+        """Return the number of nodal diameters of each mode, (n,); see `whirl.nodal_diameters`."""
         return nodal_diameters(self.whole_shapes)
 
     @property
     def whirl(self) -> tuple[Array, Array]:
         """Return the backward and forward whirl frequencies of each mode, (speeds, n) rad/s.
 
-        They are those in the fixed frame, NaN for a mode that does not whirl.
+        The frequencies are those in the fixed frame, and NaN for a mode that does not whirl.
         """
         shapes, values = self.whole_shapes, self.eigenvalues[..., 0]
         return whirl(shapes, values, self.damped_frequencies, self.speeds)
 
     @property
     def fixed_frame(self) -> FixedFrame | str:
-        """Return the motions in the rotating and in the fixed frame, or why there is no whirl."""
+        """Return the motions in both frames, or the reason why whirl is not defined."""
         return fixed_frame(self.names, self.whole_shapes, self.damped_frequencies, self.speeds)
 
 
@@ -484,15 +508,17 @@ class FloquetTable:
 
     Attributes
     ----------
-    speeds : (speeds,) rad/s.
-    multipliers : (speeds, 2n).
-    largest : (speeds,) modulus of the largest one that is not always 1.
-    stable : (speeds,) 1, 0, or -1 where no periodic motion was found.
-    product_error : (speeds,) logarithm of their product less the integrated trace; NaN where
-        rounding hides it.
-    torque : (speeds,) N m on the rotor.
-    mismatch : (speeds,) rad by which a turn is not periodic.
-    messages : for each speed why there is no motion, or "".
+    speeds : (speeds,) rotor speeds, rad/s.
+    multipliers : (speeds, 2n) all multipliers.
+    largest : (speeds,) largest modulus of the multipliers that are not always 1.
+    stable : (speeds,) 1 if the motion is stable, 0 if it is unstable, -1 if no periodic motion was
+        found.
+    product_error : (speeds,) logarithm of the modulus of the product of all multipliers, minus the
+        integrated trace. It would be zero without errors, and is NaN where rounding hides it.
+    torque : (speeds,) constant torque on the rotor that maintains its mean speed, N m.
+    mismatch : (speeds,) largest difference between the states at the end and at the start of the
+        turn: angles in rad, rates divided by the rotor speed.
+    messages : for each speed the reason why no motion was found; "" if one was.
     """
 
     speeds: Array
@@ -517,11 +543,12 @@ class SceneModes:
 
     Attributes
     ----------
-    scene, scene_hash, title, blades, gravity : of the scene; gravity in m/s².
+    scene, scene_hash, title, blades, gravity : name, digest, title, number of blades and gravity
+        (m/s²) of the scene.
     rest, rotation : modes at rest under gravity, and in steady rotation without gravity, by model.
-    floquet : multipliers of a turn under gravity; None where there are none.
+    floquet : Floquet multipliers of a turn under gravity; None if they were not computed.
     notes : reasons for missing results.
-    label : the scene's name, with what was changed in a shipped one.
+    label : name of the scene; for a changed shipped scene it also has the changes.
     """
 
     scene: str
@@ -537,12 +564,12 @@ class SceneModes:
 
     @property
     def disagreement(self) -> float:
-        """Return the largest difference of two models; 0 for one model.
+        """Return the largest difference between the closed form and another model.
 
-        It is that of a mode's larger eigenvalue in modulus, or of the mean real part, divided by
-        the largest eigenvalue. Of eigenvalues below a thousandth of the largest one it is the
-        residual of the closed form's mode in the other model's equations, see
-        `LinearModes.residual`.
+        It is 0 if there is only one model. The difference of a mode is that of the larger modulus
+        of its two eigenvalues, or that of their mean real part, divided by the largest eigenvalue
+        of all modes. For an eigenvalue below a thousandth of the largest, it is the residual of the
+        closed form's mode in the equations of the other model, see `LinearModes.residual`.
         """
         largest = 0.0
         for kind in (self.rest, self.rotation):
@@ -553,7 +580,7 @@ class SceneModes:
 
     @property
     def residuals(self) -> dict[str, float]:
-        """Return the largest residual of each model's modes in its own equations."""
+        """Return, by model, the largest residual of its modes in its own equations."""
         residuals: dict[str, float] = {}
         for kind in (self.rest, self.rotation):
             for model, source in kind.items():
@@ -562,14 +589,14 @@ class SceneModes:
 
     @property
     def agrees(self) -> bool:
-        """Return whether the models agree, and each one's modes satisfy its own equations."""
+        """Return whether the models agree, and the modes of each satisfy its own equations."""
         return self.disagreement <= AGREEMENT and not self.faults
 
     @property
     def faults(self) -> list[str]:
         """Return a line for each model whose modes do not satisfy its own equations.
 
-        Their residual is above PRINTED_PRECISION.
+        The modes of such a model have a residual above PRINTED_PRECISION.
         """
         lines = []
         for model, residual in self.residuals.items():
@@ -581,17 +608,19 @@ class SceneModes:
 
     @property
     def closed_form(self) -> list[LinearModes]:
-        """Return the modes of the closed form at rest and over speed, where they were computed."""
+        """Return the modes of the closed form at rest and in rotation, if they were computed."""
         return [next(iter(kind.values())) for kind in (self.rest, self.rotation) if kind]
 
 
 def _difference(first: LinearModes, other: LinearModes) -> float:
-    """Return the difference of two sources of one state, see `SceneModes.disagreement`.
+    """Return the largest difference between the modes of two models.
+
+    The difference is defined in `SceneModes.disagreement`.
 
     Parameters
     ----------
-    first, other : sources with the same speeds and modes; slow modes of `first` are put into the
-        equations of `other`.
+    first, other : modes of two models, at the same speeds and in the same order. Slow modes of
+        `first` are inserted into the equations of `other`.
     """
     sizes = np.abs(first.eigenvalues)  # (speeds, modes, 2)
     top = float(np.nanmax(sizes, initial=0.0))
@@ -621,8 +650,8 @@ def _difference(first: LinearModes, other: LinearModes) -> float:
 def mode_rows(modes: SceneModes) -> list[dict[str, object]]:
     """Return a row for each state, speed and mode of the closed form.
 
-    Speeds and frequencies are in rad/s, growth in 1/s; a number that does not exist is None. Whirl
-    frequencies are those in the fixed frame, all others in the rotating frame.
+    Speeds and frequencies are in rad/s, growth rates in 1/s. A number that does not exist is None.
+    Whirl frequencies are in the fixed frame, all other frequencies in the rotating frame.
 
     Parameters
     ----------
@@ -642,7 +671,7 @@ def mode_rows(modes: SceneModes) -> list[dict[str, object]]:
         state = "at rest" if linear.kind == REST else "steady rotation without gravity"
         for i, speed in enumerate(linear.speeds.tolist()):
             for k, name in enumerate(linear.names):
-                # JSON has no NaN and no infinity: None in their place.
+                # None replaces NaN and infinity, which JSON does not have.
                 shown = {
                     key: float(a[i, k]) if math.isfinite(a[i, k]) else None
                     for key, a in numbers.items()
@@ -652,11 +681,11 @@ def mode_rows(modes: SceneModes) -> list[dict[str, object]]:
 
 
 def mode_table(rows: Sequence[Mapping[str, object]]) -> TextTable:
-    """Return a table of rows of `mode_rows`, with damped frequencies in Hz, too.
+    """Return a table of modes, in which damped frequencies are in rad/s and in Hz.
 
     Parameters
     ----------
-    rows : speeds and frequencies in rad/s, growth in 1/s.
+    rows : rows as `mode_rows` returns them.
     """
     head = (
         "state",
@@ -676,7 +705,7 @@ def mode_table(rows: Sequence[Mapping[str, object]]) -> TextTable:
     for row in rows:
         damped = row["damped_frequency"]
         hertz = damped / math.tau if isinstance(damped, float) else None
-        # a table as wide as a screen
+        # A shorter text of the state, so that the table fits the width of a screen.
         state = "at rest" if row["state"] == "at rest" else "rotating, no gravity"
         shown = state, row["speed"], row["mode"], row["undamped_frequency"], damped, hertz
         cells.append(tuple(map(cell, (*shown, row["damping_ratio"], row["growth_rate"]))))
@@ -684,16 +713,17 @@ def mode_table(rows: Sequence[Mapping[str, object]]) -> TextTable:
 
 
 def campbell_table(linear: LinearModes, places: Sequence[int] | None = None) -> TextTable:
-    """Return frequencies in Hz over the rotor speed in rpm, in both frames.
+    """Return a table of frequencies in Hz over the rotor speed in rpm.
 
-    A row for each speed and motion; where no whirl is defined, one for each speed and mode, in the
-    rotating frame alone. The last column but one has the frequency in the fixed frame as a multiple
-    of the rotor speed.
+    The table has a row for each speed and motion, with the frequencies in both frames. Its column
+    "per rev" is the frequency in the fixed frame, divided by the rotor speed. If whirl is not
+    defined, the table has a row for each speed and mode, with the frequency in the rotating frame
+    only, and "per rev" is this frequency, divided by the rotor speed.
 
     Parameters
     ----------
     linear : modes over speed.
-    places : of the speeds that are shown; all if None.
+    places : indices of the speeds that are shown; None for all speeds.
     """
     frame = linear.fixed_frame
     speeds = linear.speeds
@@ -738,15 +768,15 @@ def _multiple(hertz: float, speed: float) -> float:
 
 
 def _printed(value: float) -> str:
-    """Return a number with six digits, "" for NaN."""
+    """Return a number as text with six digits; "" if it is not finite."""
     return f"{value:.6g}" if math.isfinite(value) else ""
 
 
 @np.errstate(all="ignore")
 def mode_summary(modes: SceneModes) -> str:
-    """Return the modes of a scene as text: numbers, stability, and whether models agree.
+    """Return a text with the modes of a scene, its stability, and whether models agree.
 
-    The modes are those at rest and at the lowest and highest speed.
+    The text has the modes at rest, and those at the lowest and highest speed.
 
     Parameters
     ----------
@@ -804,9 +834,9 @@ _SCALES = {
     "motion": Column(("motion",), "1", "number of the motion in the fixed frame"),
     "multiplier": Column(("multiplier",), "1", "number of the multiplier, the largest first"),
 }
-# What a group of a file has, declared once for writing and reading. By name of the array: what it
-# is in the object that is stored, see `_part`, and its description. Scales are numbers from 0,
-# but for the speeds.
+# Declaration of the arrays in a group of a file, for writing and for reading. For each array name
+# it has the path of the array in the stored object (see `_part`), and a description. The values of
+# a scale are numbers from 0, except for the speeds.
 Declared: TypeAlias = Mapping[str, tuple[str, Column]]
 
 _mode = partial(Column, ("speed", "mode"))
@@ -859,7 +889,7 @@ _LINEAR: Declared = {
         Column(("mode",), "1", "nodal diameters of the mode shape, -1: several", "<i8"),
     ),
 }
-# What numbers of modes are, by name.
+# Descriptions of the arrays of modes, by name.
 MODE_COLUMNS = {"speed": _SCALES["speed"]} | {name: column for name, (_, column) in _LINEAR.items()}
 _motion = partial(Column, ("speed", "motion"))
 _FIXED_FRAME: Declared = {
@@ -910,12 +940,12 @@ _FLOQUET: Declared = {
 
 
 def _part(stored: LinearModes | FloquetTable, path: str) -> NDArray[Any]:
-    """Return an array of what is stored: "whirl.1" is `stored.whirl[1]`.
+    """Return an array of an object by its path, such as `stored.whirl[1]` for "whirl.1".
 
     Parameters
     ----------
-    stored : the modes or multipliers.
-    path : attributes and numbers of entries, joined by dots.
+    stored : the object that is stored: modes or multipliers.
+    path : names of attributes and indices of entries, joined by dots.
     """
     value: Any = stored
     for name in path.split("."):
@@ -930,14 +960,14 @@ def _record(
     stored: LinearModes | FloquetTable,
     declared: Declared,
 ) -> Record:
-    """Return the record of modes or multipliers, with the scales of all arrays first.
+    """Return a record of modes or multipliers: the scales, then the declared arrays.
 
     Parameters
     ----------
-    scene, name : of the record.
-    attributes : further values of the record.
-    stored : what has the arrays.
-    declared : the arrays.
+    scene, name : scene and name of the record.
+    attributes : attributes of the record.
+    stored : the object from which the arrays are taken.
+    declared : declaration of the arrays.
     """
     arrays: dict[str, NDArray[Any]] = {}
     lengths: dict[str, int] = {}
@@ -957,13 +987,14 @@ def _stored_fields(
     arrays: Mapping[str, NDArray[Any]],
     declared: Declared,
 ) -> dict[str, Any]:
-    """Return the arrays that are fields of a class, by field, from those of a record.
+    """Return the fields of a stored object that are arrays, by name, from the arrays of a record.
 
     Parameters
     ----------
-    cls : of what was stored; its other arrays follow from its fields.
-    arrays : of the record.
-    declared : the same as for writing.
+    cls : class of the stored object. Arrays of the record that are not fields of the class are left
+        out: they are properties, which follow from the fields.
+    arrays : arrays of the record, by name.
+    declared : the declaration with which the record was written.
     """
     names = {field.name for field in fields(cls)}
     values: dict[str, Any] = {"speeds": arrays["speed"]}
@@ -975,7 +1006,9 @@ def _stored_fields(
 
 
 def to_records(modes: SceneModes) -> list[Record]:
-    """Return the records of a file of modes: one for each model and kind, and the multipliers.
+    """Return the records that store the modes of a scene.
+
+    There is a record for each model at rest and in rotation, and one for the Floquet multipliers.
 
     Parameters
     ----------
@@ -992,12 +1025,12 @@ def to_records(modes: SceneModes) -> list[Record]:
 
 
 def _linear_record(scene: str, linear: LinearModes, common: Mapping[str, Any]) -> Record:
-    """Return the record of one source.
+    """Return the record of the modes of one model.
 
     Parameters
     ----------
     scene : name of the scene.
-    linear : modes of the source.
+    linear : modes of the model.
     common : attributes that all records of the scene have.
     """
     frame = linear.fixed_frame
@@ -1019,17 +1052,17 @@ def _linear_record(scene: str, linear: LinearModes, common: Mapping[str, Any]) -
 
 
 def linear_dataset(sources: Mapping[str, LinearModes], xarray: Any) -> Any:
-    """Return all sources of one state as an xarray.Dataset with the dimension `solver`.
+    """Return the modes of all models as an xarray.Dataset, in which a model is a `solver`.
 
     Parameters
     ----------
-    sources : modes by model.
-    xarray : the module.
+    sources : modes at rest, or in rotation, by model.
+    xarray : the module xarray.
 
     Raises
     ------
     InputError
-        If there is no source.
+        If `sources` is empty.
     """
     if not sources:
         raise InputError("no modes of this state; allowed: a state that was computed")
@@ -1069,11 +1102,11 @@ def read_modes(path: Path) -> dict[str, SceneModes]:
 
 
 def _modes_of(of_all: Sequence[Record]) -> dict[str, SceneModes]:
-    """Return the modes that records of a file hold, by scene, the closed form first.
+    """Return the modes that are stored in records, by scene, with the closed form first.
 
     Parameters
     ----------
-    of_all : records of all scenes, as `to_records` makes them.
+    of_all : records of all scenes, as `to_records` returns them.
     """
     by_scene: dict[str, dict[str, Record]] = {}
     for record in of_all:
@@ -1115,7 +1148,7 @@ def _modes_of(of_all: Sequence[Record]) -> dict[str, SceneModes]:
             notes=tuple(str(facts["notes"]).splitlines()),
             label=str(facts.get("scene_label", scene)),
         )
-        # arrays that do not fit together raise here
+        # These computations raise an error here if the arrays do not fit together.
         assert isinstance(modes_by_scene[scene].agrees, bool)
         for linear in modes_by_scene[scene].closed_form:
             assert linear.fixed_frame

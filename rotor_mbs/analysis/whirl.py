@@ -1,20 +1,22 @@
 """Whirl of a rotor of equal blades: nodal diameters of mode shapes, frequencies in the fixed frame.
 
-Blade i of N, mounted at ψ_i = 2π(i-1)/N on a rotor at the angle q = Ω t, stands at the azimuth
-ψ = Ω t + ψ_i. Its pitch in a mode, Re φ_i e^{λt}, is a sum of waves over the blades,
+The rotor has N blades, and its angle is q = Ω t. Blade i is mounted at ψ_i = 2π(i-1)/N, so that its
+azimuth is ψ = Ω t + ψ_i. In a mode its pitch Re φ_i e^{λt} is a sum of waves over the blades,
 
-    Re c_n e^{λt - j n ψ_i},   c_n = (1/N) Σ_i φ_i e^{j n ψ_i},   -N/2 < n <= N/2,
+    Re c_n e^{λt - j n ψ_i},   c_n = (1/N) Σ_i φ_i e^{j n ψ_i},   -N/2 < n <= N/2.
 
-that run towards larger azimuths for n > 0 and have |n| nodal diameters. At a fixed azimuth the wave
-is Re c_n e^{(λ + j n Ω) t - j n ψ}: of the frequency ω in the rotating frame the fixed one has
-|ω + n Ω|. A wave is called forward if it runs, in the rotating frame, the way the rotor turns: its
-frequency in the fixed frame is ω + |n Ω|, that of a backward one |ω - |n Ω||. Where ω < |n Ω| the
-rotor carries a backward wave along, so that it moves forward in the fixed frame.
+A wave has |n| nodal diameters, and runs towards larger azimuths for n > 0. At a fixed azimuth ψ it
+is Re c_n e^{(λ + j n Ω) t - j n ψ}: a wave with the frequency ω in the rotating frame has the
+frequency |ω + n Ω| in the fixed frame. A wave is called forward if it runs, in the rotating frame,
+in the direction of rotation. The frequency in the fixed frame is ω + |n Ω| for a forward wave, and
+|ω - |n Ω|| for a backward wave. If ω < |n Ω|, the rotor carries a backward wave along, so that it
+moves forward in the fixed frame.
 
-Waves of the diameter 0 (collective) and N/2 (differential: neighbours against each other) do not
-whirl; multiblade coordinates have no azimuth there, and both frames have the same frequency.
+Waves with 0 nodal diameters (collective) or N/2 (differential: neighbouring blades in opposite
+directions) do not whirl. Their multiblade coordinates have no azimuth, and their frequency is the
+same in both frames.
 
-Source: R. P. Coleman, A. M. Feingold, NACA Report 1351, 1958; M. H. Hansen, Wind Energy 6 (2003)
+Sources: R. P. Coleman, A. M. Feingold, NACA Report 1351, 1958; M. H. Hansen, Wind Energy 6 (2003)
 179-195; G. Bir, AIAA 2008-1300.
 """
 
@@ -30,28 +32,32 @@ from rotor_mbs.solution.trajectory import Array
 
 Complex = NDArray[np.complex128]
 
-HERTZ = 1.0 / (2.0 * np.pi)  # Hz of a rad/s
-RPM = 30.0 / np.pi  # rpm of a rad/s
+HERTZ = 1.0 / (2.0 * np.pi)  # 1 rad/s in Hz
+RPM = 30.0 / np.pi  # 1 rad/s in rpm
 
-# Share of a mode shape that is rounding: what is left of other nodal diameters, of the other
-# direction. Six digits are printed.
+# Share of a mode shape up to which waves of other nodal diameters, or of the other direction, count
+# as rounding. The share corresponds to the six digits that are printed.
 _PURE = 1e-6
-# Share of the largest eigenvalue within which two eigenvalues are one, as models agree.
+# Two eigenvalues count as equal if they differ by at most this share of the largest eigenvalue. It
+# is the share within which models must agree.
 _EQUAL = 1e-8
 
 
 @dataclass(frozen=True)
 class FixedFrame:
-    """Hold the motions of a rotor of equal blades as a fixed observer sees them.
+    """Hold the motions of a rotor of equal blades, with their frequencies in both frames.
+
+    A motion is a backward or forward whirl, or a mode that does not whirl.
 
     Attributes
     ----------
-    names : of the m motions: "backward whirl", "forward whirl" (of two nodal diameters and more
-        with their number: "forward whirl 2"), and the modes that do not whirl by their own names.
-    diameters : (m,) nodal diameters, below 0 of a backward whirl.
+    names : names of the m motions: "backward whirl" or "forward whirl", followed by the number of
+        nodal diameters if there are two or more ("forward whirl 2"); a mode that does not whirl has
+        its own name.
+    diameters : (m,) number of nodal diameters; it is negative for a backward whirl.
     rotating, fixed : (speeds, m) rad/s, damped frequency in the rotating and in the fixed frame.
-    rotor_share : (speeds, m) amplitude of the rotor's angle over that of the pitches; NaN where no
-        pitch moves.
+    rotor_share : (speeds, m) amplitude of the rotor angle, divided by the largest amplitude of a
+        pitch; NaN where no pitch moves.
     """
 
     names: tuple[str, ...]
@@ -66,25 +72,27 @@ def wave_amplitudes(pitches: Array | Complex) -> Complex:
 
     Parameters
     ----------
-    pitches : (..., N) pitch amplitudes of a mode, or pitches.
+    pitches : (..., N) pitch amplitudes of a mode, or pitch angles.
 
     Returns
     -------
     ndarray
-        In NumPy's order of frequencies: n = 0, 1, ..., -2, -1.
+        c_n in NumPy's order of frequencies: n = 0, 1, ..., -2, -1.
     """
-    # The inverse transform has the positive sign in the exponent, and the factor 1/N.
+    # NumPy's inverse transform has the positive exponent and the factor 1/N of c_n.
     return np.asarray(np.fft.ifft(pitches, axis=-1), dtype=complex)
 
 
 def nodal_diameters(shapes: Complex) -> NDArray[np.int64]:
-    """Return the number of nodal diameters of each mode; -1 where its shape has several.
+    """Return the number of nodal diameters of each mode, (n,).
 
-    The rotor's angle counts to the diameter 0: it moves all blades alike.
+    It is -1 for a mode whose shape has waves of several numbers of nodal diameters. The rotor angle
+    counts as a wave with 0 nodal diameters, because it moves all blades alike.
 
     Parameters
     ----------
-    shapes : (speeds, n, 1 + N) amplitudes of rotor and pitches; NaN at speeds without modes.
+    shapes : (speeds, n, 1 + N) amplitudes of the rotor and the pitches; NaN at speeds without
+        modes.
     """
     blades = shapes.shape[2] - 1
     waves = np.abs(wave_amplitudes(shapes[:, :, 1:])) ** 2 * blades  # shares of Σ |φ_i|²
@@ -106,7 +114,9 @@ def nodal_diameters(shapes: Complex) -> NDArray[np.int64]:
 
 
 def why_no_whirl(diameters: NDArray[np.int64], blades: int) -> str:
-    """Return why modes do not whirl, "" where they do: as many of each diameter as coordinates.
+    """Return why whirl is not defined; "" if it is.
+
+    Whirl is defined if modes and multiblade coordinates have the same numbers of nodal diameters.
 
     Parameters
     ----------
@@ -128,9 +138,9 @@ def whirl_frequencies(
 
     Parameters
     ----------
-    frequency : rad/s, in the rotating frame.
-    speed : rad/s, of the rotor; its sign is that of no frequency.
-    diameter : nodal diameters, the number k of the coordinates cosine_k and sine_k.
+    frequency : frequency in the rotating frame, rad/s.
+    speed : rotor speed, rad/s; only its magnitude matters.
+    diameter : number of nodal diameters: k for the multiblade coordinates cosine_k and sine_k.
     """
     carried = diameter * np.abs(speed)
     return np.abs(frequency - carried), frequency + carried
@@ -139,22 +149,24 @@ def whirl_frequencies(
 def whirl(
     shapes: Complex, eigenvalues: Complex, frequencies: Array, speeds: Array
 ) -> tuple[Array, Array]:
-    """Return the frequencies at which each mode is seen in the fixed frame as a whirl.
+    """Return the backward and forward whirl frequency of each mode in the fixed frame.
 
-    A standing wave is a sum of both directions, as are two modes of one eigenvalue, of which any
-    combination is a mode. A mode alone whose phases go round in one direction is seen in it only.
+    A mode that is a standing wave is a sum of a backward and a forward wave, and has both
+    frequencies. So do two modes with equal eigenvalues, because each combination of both is a mode,
+    too. A single mode that is a wave in one direction has only the frequency of that direction.
 
     Parameters
     ----------
-    shapes : (speeds, n, 1 + N) amplitudes of rotor and pitches.
-    eigenvalues : (speeds, n) 1/s, that of each shape.
-    frequencies : (speeds, n) rad/s, damped, in the rotating frame.
-    speeds : (speeds,) rad/s, of the rotor.
+    shapes : (speeds, n, 1 + N) amplitudes of the rotor and the pitches.
+    eigenvalues : (speeds, n) 1/s, the eigenvalue of each shape.
+    frequencies : (speeds, n) rad/s, damped frequencies in the rotating frame.
+    speeds : (speeds,) rad/s, rotor speeds.
 
     Returns
     -------
     backward, forward : ndarray
-        (speeds, n) rad/s; NaN where the mode has no such wave, and where no whirl is defined.
+        (speeds, n) rad/s; NaN where the mode has no wave in this direction, and where whirl is not
+        defined.
     """
     blades = shapes.shape[2] - 1
     diameters = nodal_diameters(shapes)
@@ -184,14 +196,15 @@ def fixed_frame(
     frequencies: Array,
     speeds: Array,
 ) -> FixedFrame | str:
-    """Return the motions in both frames, or why whirl is not defined.
+    """Return the motions in both frames, or the reason why whirl is not defined.
 
-    Of two modes of a nodal diameter the backward whirl is that in which the backward wave is
-    stronger; for equal blades both have one frequency.
+    Two modes have the same number of nodal diameters. The mode in which the backward wave is
+    stronger gives the backward whirl, and the mode in which the forward wave is stronger gives the
+    forward whirl. If the pair has equal frequencies, the choice does not matter.
 
     Parameters
     ----------
-    names : of the n modes.
+    names : names of the n modes.
     shapes, frequencies, speeds : see `whirl`.
     """
     blades = shapes.shape[2] - 1
@@ -217,10 +230,10 @@ def fixed_frame(
             shares.append(rotor_share[:, mode])
             continue
         if diameter in diameters[:mode]:
-            continue  # with the first mode of the two
+            continue  # both modes of the pair are treated at the first one
         pair = np.flatnonzero(known_diameters == diameter)
         for sign, direction in ((-1, "backward"), (1, "forward")):
-            # Of each mode the amplitude in this direction: (speeds, 2).
+            # The amplitude of the wave in this direction in each mode of the pair: (speeds, 2).
             amplitudes = np.column_stack(
                 [_directions(shapes[:, other], speeds, diameter)[(1 + sign) // 2] for other in pair]
             )
@@ -241,13 +254,13 @@ def fixed_frame(
 
 
 def _directions(shapes: Complex, speeds: Array, diameter: int) -> tuple[Array, Array]:
-    """Return the amplitudes of the backward and of the forward wave, (speeds,) each.
+    """Return the amplitudes of the backward and the forward wave of a mode, (speeds,) each.
 
     Parameters
     ----------
-    shapes : (speeds, 1 + N) of one mode.
-    speeds : (speeds,) rad/s, whose sign says which direction is forward.
-    diameter : of both waves.
+    shapes : (speeds, 1 + N) amplitudes of the rotor and the pitches in the mode.
+    speeds : (speeds,) rad/s, rotor speeds; their sign determines which direction is forward.
+    diameter : number of nodal diameters of both waves.
     """
     waves = np.abs(wave_amplitudes(shapes[:, 1:]))
     up, down = waves[:, diameter], waves[:, -diameter]

@@ -1,7 +1,8 @@
-"""Define the commands that list and show what is available, run studies and write pages.
+"""Commands that list and show scenes and methods, run studies, and write files and pages.
 
-`run`, `reproduce` and `reference` are in `cli.runs`, `check` and `test-method` in `cli.verdicts`.
-Each command imports only what it needs: `list` reads no scene, and pages load no model.
+The commands `run`, `reproduce` and `reference` are in `cli.runs`, `check` and `test-method` in
+`cli.verdicts`. A command imports the modules that only it needs when it is called. Therefore `list`
+loads no code that reads scenes, and `report` loads no model.
 """
 
 from __future__ import annotations
@@ -45,11 +46,11 @@ from rotor_mbs.solution.status import REFUSED
 
 
 def list_all(arguments: argparse.Namespace) -> int:
-    """Print the name and title of every shipped scene and sweep, name and label of every method.
+    """Print the shipped scenes and sweeps with their titles, and all methods with their labels.
 
     Parameters
     ----------
-    arguments : `json`, whether they are printed as JSON.
+    arguments : `json`, whether JSON is printed.
     """
     scenes, sweeps = list_scenes(), list_sweeps()
     labels = [(method.name, method.label) for method in methods()]
@@ -77,18 +78,21 @@ def list_all(arguments: argparse.Namespace) -> int:
 
 
 def new(arguments: argparse.Namespace) -> int:
-    """Write a commented scene file that does not exist yet.
+    """Write a new scene file.
 
-    For an OpenFAST model, a mapping file for its results is written beside it.
+    The scene is a copy of a source, is made from an OpenFAST model, or is a commented example with
+    all keys. For an OpenFAST model, a mapping file for its results is written beside the scene.
 
     Parameters
     ----------
-    arguments : `file`, the scene file; `source`, a scene, a TOML file or a .fst file, or None.
+    arguments : `file`, the scene file to write; `source`, the name of a scene, a TOML file or a
+        .fst file, or None.
 
     Raises
     ------
     InputError
-        If a name is not allowed, a file exists or cannot be created, or the source cannot be read.
+        If the file's name is not allowed, a file exists already or cannot be created, or the source
+        cannot be read.
     """
     from rotor_mbs.scenario.scene import new_scene_text
 
@@ -128,17 +132,17 @@ def new(arguments: argparse.Namespace) -> int:
 
 
 def _files_of_model(path: Path, model: Path) -> tuple[dict[Path, str], list[str]]:
-    """Return the scene and the mapping of an OpenFAST model, and lines that describe them.
+    """Return the texts of a scene file and a mapping file for an OpenFAST model.
 
     Parameters
     ----------
-    path : of the scene file; the mapping is beside it.
-    model : the model's .fst file.
+    path : path of the scene file; the mapping file is beside it.
+    model : the .fst file of the model.
 
     Returns
     -------
     dict of str by Path, list of str
-        The text of each file, and the lines to print.
+        The text of each file, and the lines to print about the model and the files.
     """
     from rotor_mbs.scenario.openfast import read_rotor
     from rotor_mbs.scenario.openfast_scene import mapping_text, scene_of_rotor
@@ -167,12 +171,12 @@ def _files_of_model(path: Path, model: Path) -> tuple[dict[Path, str], list[str]
 
 
 def show(arguments: argparse.Namespace) -> int:
-    """Show a scene with its methods, the settings of a method, or what is in a file.
+    """Print a scene with its methods, the settings of a method, or a summary of a results file.
 
     Parameters
     ----------
-    arguments : `scene`, the name or path; `build`, whether the items that each model builds are
-        listed; `json`, whether JSON is printed.
+    arguments : `scene`, the name of a scene or method, or the path of a file; `build`, whether the
+        items that each model builds are printed; `json`, whether JSON is printed.
     """
     from rotor_mbs.runs.trailer import is_of_this_program
 
@@ -197,7 +201,7 @@ def show(arguments: argparse.Namespace) -> int:
 
 
 def _show_method(method: Method, *, as_json: bool) -> None:
-    """Print the settings of a method: defaults, allowed values and meanings.
+    """Print the settings of a method with their defaults, allowed values and meanings.
 
     Parameters
     ----------
@@ -224,12 +228,12 @@ def _show_method(method: Method, *, as_json: bool) -> None:
 
 
 def _show_scene(arguments: argparse.Namespace) -> None:
-    """Print a scene's data and the methods that can run it.
+    """Print the data of a scene, and all methods; a method that cannot run it has the reason.
 
     Parameters
     ----------
-    arguments : `scene`, its name or path; `build`, whether the items that each model builds are
-        printed; `json`, whether JSON is printed.
+    arguments : `scene`, the name of the scene or the path of its file; `build`, whether the items
+        that each model builds are printed; `json`, whether JSON is printed.
     """
     from rotor_mbs.scenario.scene import scene_keys, scene_tables, unit_of, without_times
 
@@ -246,7 +250,8 @@ def _show_scene(arguments: argparse.Namespace) -> None:
         model = models.setdefault(method.model, facts)
         model["methods"].append(method.name)
         model["is_linearized"] |= method.linearize is not None
-        # The methods of a model build the same items: those of the first that has any are shown.
+        # All methods of a model build the same items. Those of the first method that returns items
+        # are shown.
         if not model["items"]:
             try:
                 model["items"], model["refused"] = list(map(asdict, method.items(scene))), ""
@@ -279,14 +284,14 @@ _DISK_IS_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 def bench(arguments: argparse.Namespace) -> int:
-    """Measure errors and run times, and write their pages.
+    """Measure errors and run times of methods, print them, and write the pages of the results file.
 
-    The exit status is 0 also if some points failed, as that is a result of the measurement.
+    A point that fails is a result of the measurement, and does not change the exit status.
 
     Parameters
     ----------
-    arguments : `scenes`, `method`, `output`, and `repeats` (runs per point) and `budget` (s per
-        scene).
+    arguments : `scenes`, their names; `method`, the names of methods; `output`, the results file;
+        `repeats`, the maximum number of timed runs of a point; `budget`, the time for a scene in s.
 
     Returns
     -------
@@ -324,14 +329,15 @@ def bench(arguments: argparse.Namespace) -> int:
 
 
 def stability(arguments: argparse.Namespace) -> int:
-    """Run the suite of stiff and extreme scenes, and write its pages.
+    """Run the suite of stiff and extreme scenes, and write the pages of the results file.
 
-    The number of runs with status ok is printed for each method.
+    A table with the number of runs that are ok is printed, by method and folder of scenes.
 
     Parameters
     ----------
-    arguments : `scenes` (by default the suite), `method`, `set`, `output`, `jobs`, and `timeout` of
-        a run (s).
+    arguments : `scenes`, the names of scenes, by default those of the suite; `method`, the names of
+        methods; `set`, settings; `output`, the results file; `jobs`, the number of processes;
+        `timeout`, the time limit of a run in s.
 
     Returns
     -------
@@ -358,18 +364,20 @@ def stability(arguments: argparse.Namespace) -> int:
 
 
 def modes(arguments: argparse.Namespace) -> int:
-    """Compute and print the modes of scenes, and write their pages.
+    """Compute and print the modes of scenes, and write the pages of the results file.
 
     Parameters
     ----------
-    arguments : `scenes`, `speeds` (rad/s), `method`, `output`, `jobs`, `timeout` of a scene (s),
-        and `json`, which prints JSON and writes no pages.
+    arguments : `scenes`, their names; `speeds`, the rotor speeds in rad/s; `method`, the names of
+        methods whose models are compared; `output`, the results file; `jobs`, the number of
+        processes; `timeout`, the time limit of a scene in s; `json`, whether JSON is printed and no
+        pages are written.
 
     Returns
     -------
     int
-        1 if two models disagree on a frequency, or a scene could not be computed; 2 if the methods
-        refused all scenes; otherwise 0.
+        1 if two models disagree, the modes of a model do not satisfy its own equations, or a scene
+        was not computed; 2 if no scene has modes; otherwise 0.
     """
     from rotor_mbs.analysis.modes import mode_rows, mode_summary, read_modes
     from rotor_mbs.studies.modes import modes_of_scenes
@@ -390,7 +398,8 @@ def modes(arguments: argparse.Namespace) -> int:
         return EXIT_BAD_INPUT
     lost = {outcome.scene for outcome in made if not outcome.is_stored}
     found = read_modes(arguments.output) if len(lost) < len(scenes) else {}
-    # The file may have modes of an earlier call for a scene of which none were computed now.
+    # Scenes whose modes were not computed by this call are left out, even if the file has modes of
+    # them from an earlier call.
     chosen = [
         found[scene.name] for scene in scenes if scene.name in found and scene.name not in lost
     ]
@@ -408,22 +417,24 @@ def modes(arguments: argparse.Namespace) -> int:
 def compare(arguments: argparse.Namespace) -> int:
     """Compare data of another program with a scene, see `api.comparisons.compare`.
 
-    A table is printed; a page and a results file with the numbers are written.
+    The verdict is printed as text or JSON. A page and a file with the numbers are written.
 
     Parameters
     ----------
-    arguments : `data`, `scene`, `columns` (mapping file), `tolerance` (rad; relative for loads and
-        modes), `timeout` (s), `output` (folder), and `json`, which prints the verdict as JSON.
+    arguments : `data`, the data file; `scene`, the name of the scene or the path of its file;
+        `columns`, the mapping file; `tolerance`, in rad, or relative for loads and modes;
+        `timeout`, the time limit in s; `output`, the folder of the page and the file; `json`,
+        whether the verdict is printed as JSON.
 
     Returns
     -------
     int
-        0 if they agree, otherwise 1.
+        0 if the data agree with the scene, otherwise 1.
 
     Raises
     ------
     InputError, StoreError
-        If the data cannot be compared, or the results file is not one of comparisons.
+        If the data cannot be compared, or the file with the numbers exists and is of another kind.
     """
     from rotor_mbs.api.comparisons import compare as compare_data
     from rotor_mbs.comparison.verdict import as_dictionary
@@ -448,7 +459,7 @@ def compare(arguments: argparse.Namespace) -> int:
 
 
 def export(arguments: argparse.Namespace) -> int:
-    """Write a scene for another program, and print the path of each file that was written."""
+    """Write a scene in the format of another program, and print the paths of the written files."""
     from rotor_mbs.studies.export import FORMATS
     from rotor_mbs.studies.export import export as export_scene
 
@@ -459,21 +470,24 @@ def export(arguments: argparse.Namespace) -> int:
 
 
 def report(arguments: argparse.Namespace) -> int:
-    """Write the pages of `arguments.file` into the folder `arguments.output`, or beside it."""
+    """Write the pages of the results file `arguments.file`.
+
+    The pages are written into the folder `arguments.output`, by default one beside the file.
+    """
     from rotor_mbs.report.build import write_report
 
     output = arguments.output or pages_beside(arguments.file)
     index = write_report(arguments.file, output, jobs=cores())
     print(index)
     if arguments.open:
-        import webbrowser  # late, as above
+        import webbrowser  # imported only if needed
 
         webbrowser.open(index.resolve().as_uri())
     return 0
 
 
 def figures(arguments: argparse.Namespace) -> int:
-    """Write the paper's figures as files for a manuscript into the folder `arguments.output`."""
+    """Write the figures of the paper, for a manuscript, to files in `arguments.output`."""
     from rotor_mbs.report.figures import write_figures
 
     print(
@@ -484,7 +498,7 @@ def figures(arguments: argparse.Namespace) -> int:
 
 
 def animate(arguments: argparse.Namespace) -> int:
-    """Draw the motion of `arguments.scene` in `arguments.file` as an animated image."""
+    """Write an animation of the motion of `arguments.scene` that `arguments.file` stores."""
     from rotor_mbs.report.animation import write_animation
 
     output = arguments.output or file_path(arguments.scene.rpartition("/")[2] + ".webp")
@@ -497,24 +511,27 @@ def sweep(arguments: argparse.Namespace) -> int:
 
     Parameters
     ----------
-    arguments : `file`, the sweep; `method`, `engine`, `jobs`, `part` (K, N), `timeout` of a run
-        (s), `output`; `fresh`, whether stored runs are recomputed; `dry_run`, whether only numbers
-        are printed; `metadata` and `datasets`, what else is written; `json`.
+    arguments : `file`, the sweep file; `method`, the names of methods; `engine`, the kind of worker
+        processes, and `jobs`, their number; `part`, (K, N) for part K of N; `timeout`, the time
+        limit of a run in s; `output`, the dataset; `fresh`, whether stored runs are computed again;
+        `dry_run`, whether only the number and size of the runs are printed; `metadata`, whether a
+        Croissant file is written; `datasets`, a folder for the files of the splits, or None;
+        `json`, whether JSON is printed.
 
     Returns
     -------
     int
-        1 if a run did not succeed or the disk is full; 2 if the methods refused all runs, or the
-        file cannot be used; otherwise 0.
+        1 if a run of a method with the corrected equations is not ok, something was refused, or the
+        disk is full; 2 if all runs were refused, or the dataset cannot be used; otherwise 0.
 
     Raises
     ------
     InputError
-        If the sweep or the engine is wrong.
+        If the sweep or the engine is not valid.
     """
     from rotor_mbs.runs.engines import open_task_pool
 
-    # opened first: its workers load their code while the sweep is read
+    # The pool is opened first, so that its workers load their code while the sweep is read.
     with open_task_pool(arguments.engine, arguments.jobs) as pool:
         from rotor_mbs.scenario.sweep import load_sweep
         from rotor_mbs.studies.sweep import plan_sweep, run_sweep
@@ -531,8 +548,8 @@ def sweep(arguments: argparse.Namespace) -> int:
             else:
                 print(f"{plan.runs:,} runs with {', '.join(plan.methods)}: {size / 1e6:,.3f} MB")
             return 0
-        stream = sys.stderr if arguments.json else sys.stdout  # standard output is the JSON's alone
-        if not plan.runs:  # as in a job array with more parts than runs
+        stream = sys.stderr if arguments.json else sys.stdout  # only JSON on the standard output
+        if not plan.runs:  # for example in a job array with more parts than runs
             if arguments.json:
                 print(
                     json.dumps(
@@ -561,8 +578,8 @@ def sweep(arguments: argparse.Namespace) -> int:
         except StoreError as exc:
             print_line(str(exc), sys.stderr)
             is_full = isinstance(exc.__cause__, OSError) and exc.__cause__.errno in _DISK_IS_FULL
-            # With stored runs this is a failure: the same command continues. Without any, the file
-            # is bad input.
+            # If runs were stored, the same command can continue, and the status is that of a
+            # failure. If none were stored, the file is bad input.
             return EXIT_FAILED if is_full or made else EXIT_BAD_INPUT
         if arguments.json:
             facts = {

@@ -1,6 +1,7 @@
-"""Define the commands `check` and `test-method`, and the formats of their results.
+"""Commands `check` and `test-method`, and the formats of their results.
 
-Checks are written as lines of text, JSON, JUnit XML and annotations of GitHub.
+The results are checks, which are written as lines of text, JSON, JUnit XML, and annotations of
+GitHub.
 """
 
 from __future__ import annotations
@@ -24,25 +25,27 @@ from rotor_mbs.runs.read import is_sweep
 from rotor_mbs.scenario.accuracy_bounds import read_bounds, shipped_bounds
 from rotor_mbs.studies import check as study
 
-# GitHub shows ten annotations of a step and drops the others silently. As many lines report margins
-# that have shrunk.
+# Maximum number of annotations: GitHub shows ten annotations of a step and drops all others without
+# a message. It is also the maximum number of lines about margins that have shrunk.
 WORST = 10
 
 
-# Regular expressions by which an earlier output of a kind is recognized, see `refuse_foreign`.
+# Regular expressions that match every file that this program writes in the format.
+# `refuse_foreign` recognizes an earlier output by them.
 JUNIT = rb'<testsuites name="rotor-mbs check"'
 JSON = rb'\A\[\]\Z|\A\[\n \{\n  "check": "'
 
 
 def check(arguments: argparse.Namespace) -> int:
-    """Check the accuracy of stored runs, or of a default set, and print the failures and a count.
+    """Check the accuracy of stored runs, or of the default set of runs, and print the failures.
 
     Parameters
     ----------
-    arguments : `file`, or None for the default set with `method` and `jobs`; `bounds`, a TOML file;
-        `require`, methods that every scene must have; `against`, an earlier file, and
-        `allow_changed`; `junit` and `json`, the files to write; `github`; `verbose`, whether passed
-        checks are printed too.
+    arguments : `file`, the file to check, or None for the default set, which is computed by
+        `method` with `jobs` processes; `bounds`, a TOML file with bounds; `require`, methods that
+        must have run on every scene; `against`, an earlier file, and `allow_changed`, whether
+        scenes may differ from it; `junit` and `json`, the files to write; `github`, whether
+        failures are printed as annotations; `verbose`, whether passed checks are printed, too.
 
     Returns
     -------
@@ -52,7 +55,7 @@ def check(arguments: argparse.Namespace) -> int:
     Raises
     ------
     InputError
-        For options that do not go together, or files of different kinds.
+        If options exclude each other, or the file and the earlier file are of different kinds.
     """
     _refuse_foreign(arguments)
     if arguments.allow_changed and arguments.against is None:
@@ -96,7 +99,7 @@ def check(arguments: argparse.Namespace) -> int:
             verdicts.append(study.runs_gone(arguments.file, arguments.against))
 
     _write_verdicts(arguments, verdicts)
-    # With `--json -` standard output has only the JSON.
+    # With `--json -` the JSON must be alone on the standard output.
     stream = sys.stderr if arguments.json == Path("-") else sys.stdout
     failures = [verdict for verdict in verdicts if not verdict.passed]
     annotated = worst_first(failures)[:WORST] if arguments.github else []
@@ -122,20 +125,20 @@ def check(arguments: argparse.Namespace) -> int:
 def report_lines(
     verdicts: Sequence[Check], annotated: Sequence[Check] = (), *, verbose: bool = False
 ) -> list[str]:
-    """Return the lines that report checks, each failure once.
+    """Return the lines that report checks; each failure has one line.
 
     Parameters
     ----------
     verdicts : checks, in the order in which they are reported.
-    annotated : failures that are printed as annotations of GitHub in place of lines.
+    annotated : failures that are written as annotations of GitHub, not as lines of text.
     verbose : whether passed checks have lines, too.
 
     Returns
     -------
     list of str
-        A line per failure, with `verbose` per check; then the annotations. Without `verbose`,
-        failures `against` an earlier file are cut to the ten worst, because one changed default
-        setting shrinks hundreds of margins.
+        A line for each failure and each changed scene, or with `verbose` for each check; then the
+        annotations. Without `verbose`, only the ten worst failures `against` an earlier file have
+        lines, because a single changed default setting can shrink hundreds of margins.
     """
     shrunk = worst_first(
         [verdict for verdict in verdicts if verdict.name == study.AGAINST and not verdict.passed]
@@ -154,17 +157,17 @@ def report_lines(
 
 
 def worst_first(failures: Sequence[Check]) -> list[Check]:
-    """Sort failed checks by their margin, those without a number first."""
+    """Return failed checks sorted by rising margin; checks whose margin is NaN come first."""
     return sorted(failures, key=lambda check: (not math.isnan(check.margin), check.margin))
 
 
 def test_method(arguments: argparse.Namespace) -> int:
-    """Test methods, and print each check with the most likely reason of a failure.
+    """Test methods, and print each check; a failed check has the most likely reason.
 
     Parameters
     ----------
-    arguments : `methods`, their names; `timeout` of a run (s); `junit` and `json`, the files to
-        write.
+    arguments : `methods`, the names of the methods; `timeout`, the time limit of a run in s;
+        `junit` and `json`, the files to write.
 
     Returns
     -------
@@ -176,7 +179,7 @@ def test_method(arguments: argparse.Namespace) -> int:
     InputError
         If `junit` or `json` is a file of another kind, or both are the same file.
     """
-    from rotor_mbs.studies.method_test import examine  # late: `check` needs no models
+    from rotor_mbs.studies.method_test import examine  # imported here: `check` does without it
 
     _refuse_foreign(arguments)
     verdicts: list[Check] = []
@@ -212,9 +215,9 @@ def test_method(arguments: argparse.Namespace) -> int:
 
 
 def _refuse_foreign(arguments: argparse.Namespace) -> None:
-    """Raise InputError if --junit or --json is a file of another kind, or both are the same.
+    """Raise InputError if --junit or --json is a file of another kind, or both are the same file.
 
-    This is checked before anything is computed.
+    Commands call this function before they compute anything.
 
     Parameters
     ----------
@@ -244,12 +247,12 @@ def _write_verdicts(arguments: argparse.Namespace, verdicts: Sequence[Check]) ->
 def line(check: Check) -> str:
     """Return a check as one line of text.
 
-    It has the outcome, what was checked in which run, the value, the bound, the margin, and for a
-    failure or an allowed change its probable reason.
+    The line has the outcome, the name of the check, scene, method and channel, the value, the bound
+    and the margin. For a failure, or an allowed change of a scene, it also has the hint.
 
     Parameters
     ----------
-    check : the check; control characters in it are escaped.
+    check : the check; control characters in its texts are escaped.
     """
     outcome = "pass" if check.passed else "FAIL"
     margin = "inf" if math.isinf(check.margin) else f"{check.margin:.3g}"
@@ -268,17 +271,17 @@ def github(check: Check) -> str:
         "%", "%25"
     )
     title = title.replace(":", "%3A").replace(",", "%2C")
-    return f"::error title={title}::{line(check).replace('%', '%25')}"  # neither has a line break
+    return f"::error title={title}::{line(check).replace('%', '%25')}"  # without line breaks
 
 
 def as_json(checks: Sequence[Check]) -> str:
-    """Return checks as a JSON list of objects.
+    """Return checks as a JSON list with an object for each check.
 
-    Numbers that JSON cannot hold (NaN, infinity) become null.
+    NaN and infinity, which JSON does not have, become null.
 
     Parameters
     ----------
-    checks : in the order of the list.
+    checks : the checks, in the order of the list.
     """
     rows = []
     for check in checks:
@@ -300,11 +303,11 @@ def as_json(checks: Sequence[Check]) -> str:
 
 
 def junit(checks: Sequence[Check]) -> bytes:
-    """Return checks as JUnit XML, as the viewers of GitHub and GitLab read it.
+    """Return checks as JUnit XML, which the viewers of GitHub and GitLab read.
 
     Parameters
     ----------
-    checks : each becomes a case, in a suite of its scene.
+    checks : the checks; each becomes a test case, and those of a scene become a test suite.
 
     Returns
     -------
@@ -343,8 +346,8 @@ def _counts(checks: Sequence[Check]) -> dict[str, str]:
 
 
 def escaped(text: str) -> str:
-    """Return `text` with escapes for control characters and surrogates.
+    """Return `text` with escapes in place of characters that are not printable.
 
-    These would control a terminal, or are not allowed in XML.
+    Control characters would control a terminal. XML allows neither them nor surrogates.
     """
     return "".join(char if char.isprintable() else ascii(char)[1:-1] for char in text)

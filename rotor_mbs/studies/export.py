@@ -1,4 +1,4 @@
-"""Export of a scene: files for MuJoCo and Exudyn, its reference trajectory as CSV."""
+"""Export of a scene: a file for MuJoCo or Exudyn, or its reference trajectory as CSV."""
 
 from __future__ import annotations
 
@@ -31,22 +31,22 @@ from rotor_mbs.studies.stored_references import frozen_solution
 def export(
     scene: Scene | str | os.PathLike[str], to: str, output: str | os.PathLike[str]
 ) -> list[Path]:
-    """Write a scene in a format of other programs.
+    """Write a scene to a file in the format of another program.
 
     Parameters
     ----------
     scene : a Scene, the name of a shipped scene, or a TOML file.
     to : "mjcf", "exudyn" or "csv" (the reference trajectory, with units).
-    output : the file; an earlier one of the same format is replaced.
+    output : the file; an earlier output in the same format is replaced.
 
     Returns
     -------
-    The paths that were written.
+    The paths of the written files.
 
     Raises
     ------
     InputError
-        For an unknown format, or if `output` exists and is not an earlier file of this format.
+        If the format is unknown, or if `output` exists and is not an earlier output in this format.
     StoreError
         If a file cannot be written, or the reference of the scene cannot be computed.
     TypeError
@@ -71,7 +71,9 @@ def export(
 
 
 def reference_csv(scene: Scene) -> str:
-    """Return the scene's reference, shipped or computed, as comma-separated values.
+    """Return the reference trajectory of a scene as comma-separated values.
+
+    A shipped reference is read; any other is computed.
 
     Raises
     ------
@@ -111,9 +113,11 @@ def reference_csv(scene: Scene) -> str:
     return text.getvalue()
 
 
-_STEP = 6.7e-4  # s, of the script: the largest time step: the default of exudyn_tree/rk67
+_STEP = 6.7e-4  # largest time step of the script, s: the default of exudyn_tree/rk67
 
-_COMMENTS = {  # by kind; parts of another kind are left out
+# Comment in the script on each part of the model, by kind of part. Parts of other kinds are not
+# written.
+_COMMENTS = {
     "node": "joint angles (rad) and rates (rad/s) that move, and their initial values",
     "object": (
         "hub and blades: kg, m, inertia about centres of mass kg m^2; springs N m/rad, dampers N m "
@@ -125,13 +129,14 @@ _COMMENTS = {  # by kind; parts of another kind are left out
 
 
 def exudyn_script(scene: Scene) -> str:
-    """Return a scene as a Python script for Exudyn alone: its kinematic tree, with a fixed step.
+    """Return a Python script that computes a scene with Exudyn, without this package.
 
-    The text is made from a template. The step is the default of exudyn_tree/rk67.
+    The script has the model of `exudyn_tree`, a kinematic tree, and integrates it with steps of at
+    most `_STEP`. The text is made from a template.
 
     Parameters
     ----------
-    scene : its loads become tables in the script.
+    scene : the scene; its loads become tables in the script.
     """
     parts = [part for part in tree.parts(scene, Loads(scene)) if part.kind in _COMMENTS]
     moving = [0, *(1 + i for i in movable_blades(scene))]
@@ -172,7 +177,7 @@ def _argument(key: str, value: Any) -> str:
     Parameters
     ----------
     key : name of the argument.
-    value : a reference to another item, a function of load terms, or numbers.
+    value : a reference to another item, a bound method of a `Moment`, or numbers.
     """
     if isinstance(value, Ref):
         return f"number[{value.kind!r}, {value.name!r}]"
@@ -189,14 +194,15 @@ def _argument(key: str, value: Any) -> str:
 
 
 def _value(value: object, indent: int = 4) -> str:
-    """Return a value as Python source, numbers with all their digits.
+    """Return a value as Python source.
 
-    Matrices become arrays; a nested list has a line for each row.
+    Numbers have all their digits. An array becomes a call of `np.array`. A list that contains lists
+    or arrays has a line for each item.
 
     Parameters
     ----------
     value : a number, a text, an array or a sequence of these.
-    indent : number of blanks before the line that the value begins on.
+    indent : indentation of the line in which the value begins, in blanks.
     """
     if isinstance(value, np.ndarray):
         return f"np.array({value.tolist()!r})"
@@ -213,8 +219,8 @@ def _value(value: object, indent: int = 4) -> str:
     return "[" + ", ".join(items) + "]"
 
 
-# For each format the ending of the file's name, the function that returns the text, and a pattern
-# that every such text contains.
+# Each format has the ending of its file names, the function that returns the text of a scene, and a
+# pattern that all its texts contain. A file without the pattern is not replaced.
 FORMATS: dict[str, tuple[str, Callable[[Scene], str], bytes]] = {
     "mjcf": (
         ".xml",

@@ -1,11 +1,10 @@
-"""Examine a method: whether it builds, keeps the protocol, and gives correct motions.
+"""Test of a method: whether it builds, keeps the protocol, and gives correct motions.
 
-Where a motion is not correct, its cause is looked for.
-
-Every run is made in a worker process with a time limit. Its samples pass the same checks as those
-of `run` and `check`. Where a motion is wrong, other equations and numbers are tried on its own
-states, interval by interval: a cause is named if it leaves at most a thousandth of the defects and
-any other more than ten times as much.
+Every run is made in a worker process with a time limit. Its samples undergo the same checks as in
+`run` and `check`. If a motion is wrong, its cause is searched: modified equations and numbers are
+integrated from each sample to the next, and compared with the run. A modification is named as the
+cause if it leaves at most a thousandth of the defects, and every other one leaves more than ten
+times as much.
 """
 
 from __future__ import annotations
@@ -49,9 +48,10 @@ OUTPUTS = ("angles", "rates", "tip", "energy", "loads")
 
 
 def five_blades() -> Scene:
-    """Return a rotor of five unequal blades, with every term, load and damper.
+    """Return a scene of five unequal blades, with every term, load and damper.
 
-    One of its loads jumps between two rows, the others have their kinks at rows.
+    One of the loads jumps between two samples. All other loads have their jumps and kinks at
+    samples.
     """
     blades = [
         Blade(
@@ -66,7 +66,8 @@ def five_blades() -> Scene:
     rests[1] = ((0.0, 0.2), (0.3, 0.2), (0.3, 0.35))  # a step
     rests[2] = ((0.0, 0.3), (0.6, 0.1))  # a ramp
     torques: list[LoadTable] = [((0.0, 3.0 + i),) for i in range(5)]
-    # An engine that ends its steps at rows alone integrates across this jump.
+    # This jump is between two samples: an engine that ends its steps only at samples integrates
+    # across it.
     torques[3] = ((0.0, 6.0), (0.413, 6.0), (0.413, -4.0))
     return Scene(
         name="five unequal blades",
@@ -90,9 +91,9 @@ def five_blades() -> Scene:
 
 
 def leaning_blades() -> Scene:
-    """Return the rotor of `five_blades` with a tilted shaft, coned blades and a hub.
+    """Return the scene of `five_blades` with a tilted shaft, coned blades and a hub.
 
-    Each blade has a different cone; the radius and mass of the hub matter to the loads.
+    Each blade has a different cone angle. The hub has a radius and a mass, which affect the loads.
     """
     scene = five_blades()
     blades = tuple(replace(blade, cone=0.3 - 0.15 * i) for i, blade in enumerate(scene.blades))
@@ -107,9 +108,10 @@ def leaning_blades() -> Scene:
     )
 
 
-# Further shipped scenes, each with a duration in s that shows its effect, the number of samples,
-# and a factor of a method's bounds, which are for slow motions: stiff bearings are harder for a
-# fixed step.
+# Shipped scenes that every method computes, besides `five_blades` and `leaning_blades`. The values
+# are a duration in s that is long enough for the effect of the scene, the number of samples, and a
+# factor by which bounds of the method are multiplied. The factor is above 1 for stiff bearings,
+# because a method with a fixed step has larger errors there than the bounds for slow motions allow.
 SCENES = {
     "check/held": (0.5, 26, 1.0),  # blades without inertia about their pitch axis
     "check/point-masses": (1.0, 51, 1.0),  # blades without inertia of their own
@@ -117,18 +119,21 @@ SCENES = {
     "paper/fig11": (1.0, 51, 1.0),  # chaotic
 }
 EXACT = ("paper/fig05", "paper/fig06", "paper/fig15-10kNm", "paper/fig03")
-_SMOOTH = "paper/fig11"  # order, symmetry, determinism
-_ORDER_BAND = 0.3
-_COARSEST = 0.02  # s, of the steps whose order is looked for
-_LONG = 1000.0  # times the duration, of a run that is to be stopped
+_SMOOTH = "paper/fig11"  # scene for the tests of order, symmetry and determinism
+_ORDER_BAND = 0.3  # amount by which a measured order may be below the claimed one
+_COARSEST = 0.02  # s; the steps of the method's ladder are shares of this interval
+_LONG = 1000.0  # factor on the duration of the run that must stop at its time limit
+# Time limit of that run in s, and time added to every limit for loading an engine.
 _STOP_S, _LOAD_S = 0.5, 20.0
-_FIRST_S = 300.0  # of a first run, in which an engine may compile its code
-_ACCURATE = 1e-6  # rad per interval: no such defect makes an energy balance fail
+_FIRST_S = 300.0  # time limit in s of the first run, in which an engine may compile its code
+# Largest defect of an accurate motion, rad per interval. It is too small to cause a failure of the
+# energy balance.
+_ACCURATE = 1e-6
 NOT_FOUND = "cause not found"
 
 
 def _run(task: tuple[str, Scene, Mapping[str, object], int, float]) -> Solution:
-    """Solve a run in a worker process; an error of the engine is returned as its status.
+    """Compute a run in a worker process, and return it; errors become the status of the run.
 
     Parameters
     ----------
@@ -137,8 +142,8 @@ def _run(task: tuple[str, Scene, Mapping[str, object], int, float]) -> Solution:
     Returns
     -------
     Solution
-        Without samples, with the reason as its message, where the method refuses the scene, is
-        stopped at the limit without samples, or raises something.
+        If the method refuses the scene, raises an error, or reaches the time limit before its first
+        sample, the run has no samples, and its message is the reason.
     """
     name, scene, settings, repeats, time_limit_s = task
     try:
@@ -148,7 +153,7 @@ def _run(task: tuple[str, Scene, Mapping[str, object], int, float]) -> Solution:
         status, message = REFUSED, str(exc)
     except OutOfTimeError as exc:
         status, message = "timed_out", str(exc)
-    except Exception as exc:  # whatever an engine raises is what is asked
+    except Exception as exc:  # any error of an engine is a result of the test
         status, message = (
             "solver_failed",
             str(exc) if isinstance(exc, RotorError) else error_line(exc),
@@ -160,14 +165,17 @@ def _run(task: tuple[str, Scene, Mapping[str, object], int, float]) -> Solution:
 def examine(
     name: str, timeout_s: float = 60.0, on_part: Callable[[int, int], None] | None = None
 ) -> list[Check]:
-    """Return the checks of a method, each with the most likely reason where it fails.
+    """Test a method, and return its checks.
+
+    The hint of a check that fails is the most likely reason.
 
     Parameters
     ----------
     name : name of the method.
     timeout_s : time limit of a run in s.
-    on_part : called with the number of parts that are done, and of all, before the first part and
-        after each: the search for the cause of a wrong motion may take minutes.
+    on_part : called before the first part of the test and after each part, with the number of
+        finished parts and the number of all parts. A part may take minutes, if the cause of a wrong
+        motion is searched.
 
     Raises
     ------
@@ -179,11 +187,11 @@ def examine(
 
 
 def _ignore(done: int, total: int) -> None:
-    """Show no progress."""
+    """Ignore the progress."""
 
 
 class _Examination:
-    """Collect the checks of one method; its runs are made in the worker process of a pool.
+    """Make the runs of one method in a worker process, and collect its checks.
 
     Parameters
     ----------
@@ -196,18 +204,19 @@ class _Examination:
         self._bounds = bounds_of(method.name).with_entries(method.bounds)
         self._bound = defect_bound(self._bounds, method.name)
         self._made: list[Check] = []
-        self._refused: dict[str, str] = {}  # scene -> reason
-        # Whether the first scene that fails by its defects has faults at a time; None until then.
+        self._refused: dict[str, str] = {}  # reasons of the method by refused scene
+        # Whether the wrong motion of the first scene that fails by its defects is explained by
+        # faults at single times; None before such a scene.
         self._has_faults_in_time: bool | None = None
 
     def checks(self, on_part: Callable[[int, int], None]) -> list[Check]:
         """Make all runs, and return the checks in the order in which they are made.
 
-        A first short run is not judged: in it an engine may compile its code.
+        The first run is short and not judged, because an engine may compile its code in it.
 
         Parameters
         ----------
-        on_part : see `examine`; a part is a scene, and the last one the other checks.
+        on_part : see `examine`. Each scene is a part; all other checks together are the last part.
         """
         self._ask(
             replace(only_scene(_SMOOTH), duration=0.02, samples=2, outputs=("angles", "rates")),
@@ -215,8 +224,8 @@ class _Examination:
         )
         scenes = [(five_blades(), 1.0), (leaning_blades(), 1.0)]
         for name, (duration, samples, allowance) in SCENES.items():
-            # The chaotic scene keeps its outputs: bounds on loads are for scenes that request
-            # them.
+            # The chaotic scene keeps its own outputs, without loads: the bounds on loads are made
+            # for scenes that request loads.
             outputs = only_scene(name).outputs if name == _SMOOTH else OUTPUTS
             scenes.append(
                 (
@@ -231,7 +240,7 @@ class _Examination:
         on_part(len(scenes), parts)
         able = [scene.name for scene, _ in scenes if scene.name not in self._refused]
         hint, reasons = "rejects every scene", set(self._refused.values())
-        if len(reasons) == 1:  # as that its engine is not installed
+        if len(reasons) == 1:  # for example that the engine is not installed
             hint = f"{hint}: {reasons.pop()}"
         self._add("builds", "all", float(not able), 0.0, hint)
         for name in EXACT:
@@ -251,13 +260,14 @@ class _Examination:
     def _add(
         self, check: str, scene: str, value: float, bound: float, hint: str, unit: str = ""
     ) -> bool:
-        """Add a check to the list, and return whether it is passed.
+        """Add a check to the list, and return whether it passes.
 
         Parameters
         ----------
         check, scene : names of the check and of the scene.
-        value, bound, unit : a value above the bound fails.
-        hint : the reason of a failure.
+        value, bound, unit : the value, its bound, and the unit of both; a value above the bound
+            fails.
+        hint : the reason, if the check fails.
         """
         made = Check(check, Where(scene, self._method.name, check), float(value), bound, hint, unit)
         self._made.append(made)
@@ -271,15 +281,16 @@ class _Examination:
         repeats: int = 1,
         limit: float = 0.0,
     ) -> Solution:
-        """Return a run of the method that is not judged.
+        """Compute a run in the worker process, and return it without judging it.
 
-        Its status is "" if it has samples, else the reason why it has none.
+        The status of the run is "" if it has samples. Otherwise the status and the message say why
+        it has none.
 
         Parameters
         ----------
-        scene, settings : what is run; settings that are not named keep their defaults.
+        scene, settings : the scene, and settings of the method; other settings keep their defaults.
         repeats : number of integrations.
-        limit : s, of one integration; 0 for the limit of the examination.
+        limit : time limit of one integration in s; 0 for the limit of all runs of the test.
         """
         name, settings, limit = (
             self._method.name,
@@ -291,23 +302,24 @@ class _Examination:
             return self._pool.submit(with_method_files(_run), task, limit + _LOAD_S).result()
         except (TaskLostError, ResourceError) as exc:
             status, message = "worker_died", str(exc)
-        except Exception as exc:  # what cannot be sent from one process to the other
+        except Exception as exc:  # a result that cannot be pickled
             status, message = "solver_failed", error_line(exc)
         return without_samples(scene, name, settings, status, message)
 
     def _scene(self, scene: Scene, allowance: float) -> None:
-        """Add the checks of one scene: refusal or samples, determinism, then those of `run_checks`.
+        """Run a scene, and add its checks: refusal or samples, determinism, those of `run_checks`.
 
-        Of several checks with the same name only the one furthest beyond its bound is added. The
-        hint of a check is the probable cause, as far as the checks before it allow one to be named.
+        If several checks of `run_checks` have the same name, only the one with the smallest margin
+        is added. The hint of a failed check is the probable cause, which may follow from an earlier
+        check.
 
         Parameters
         ----------
-        scene : without loads it is tried again where the method refuses it.
-        allowance : factor by which bounds on defects, energy and loads are multiplied.
+        scene : the scene; if the method refuses it, it is run again without loads.
+        allowance : factor by which the bounds on defects, energy and loads are multiplied.
         """
         solution = self._ask(scene)
-        if solution.status == REFUSED:  # perhaps because of the loads, which a method need not have
+        if solution.status == REFUSED:  # perhaps because of the loads, which are optional
             without_loads = replace(
                 scene, outputs=tuple(name for name in OUTPUTS if name != "loads")
             )
@@ -323,7 +335,8 @@ class _Examination:
         if not self._add("samples", scene.name, float(bool(fault)), 0.0, fault):
             return
         if scene.name == _SMOOTH:
-            # Built again, and integrated twice: neither the process nor the solver may keep state.
+            # The solver is built again in the same process, and integrates twice. Both must not
+            # change the result: neither the process nor the solver may keep state.
             again = self._ask(scene, repeats=2)
             first, second = (run.quantities | {"time": run.time} for run in (solution, again))
             is_same = first.keys() == second.keys() and all(
@@ -335,10 +348,12 @@ class _Examination:
         defects = defects_of(scene, run)
         with np.errstate(all="ignore"):
             metrics = metrics_of(scene, run, None, defects)
-            # Tips, energies and loads that a method does not compute have no check.
+            # `run_checks` has no checks for tips, energies and loads that the method does not
+            # compute.
             samples = RunSamples(scene, self._method.name, run, metrics, defects)
             checks = list(run_checks(samples, self._bounds))
-        # Of several checks of a name the one furthest beyond its bound.
+        # The check of each name with the smallest margin: in the dict a later check replaces an
+        # earlier one.
         worst = {check.name: check for check in sorted(checks, key=lambda check: -check.margin)}
         reason = rows = ""
         if (
@@ -349,8 +364,8 @@ class _Examination:
             rows = wrong_rows(scene, run, defects)
             reason = rows or self._cause(scene, run, defects)
         for name, check in worst.items():
-            # The error is the sum of the defects: where a motion amplifies it, only they are due to
-            # the method.
+            # The check "error" is left out: its value is the defects, amplified by the motion. Only
+            # the defects are due to the method.
             if name == "error":
                 continue
             # Loads are as accurate as the accelerations, whose errors are the defects.
@@ -364,7 +379,7 @@ class _Examination:
                 hint = "the motion is wrong: see the defect"
             elif name == "energy":
                 hint = f"energy minus work is not constant; {NOT_FOUND}"
-                # Neither forces, masses nor the step can be wrong where the motion is right.
+                # If the motion is right, forces, masses and the step are right, too.
                 if "defect" in worst and worst["defect"].value <= _ACCURATE * allowance:
                     hint = "the motion is right: a stored energy is wrong"
                     if "energies" in worst and worst["energies"].passed:
@@ -379,13 +394,13 @@ class _Examination:
     def _cause(self, scene: Scene, run: Trajectory, defects: Defects) -> str:
         """Return why the defects of a run are too large.
 
-        First the step is halved; then other equations and numbers are tried. What none of these
-        explains may be faults at a time, or a scheme of lower order.
+        Possible causes are tried in this order: a step that is too large, wrong equations or
+        numbers, faults at single times, and a scheme of lower order than the method claims.
 
         Parameters
         ----------
         scene, run : the scene, and the samples of its run.
-        defects : of the run, of which at least one is beyond its bound.
+        defects : interval defects of the run; at least one is above its bound.
         """
         left, order = self._with_half_step(scene, run, defects)
         claimed = self._method.order or 1.0
@@ -400,22 +415,24 @@ class _Examination:
             alike = DefectSearch(judged).textbook_causes()
             if alike and self._has_faults_in_time is None:
                 self._has_faults_in_time = False
-            if len(alike) > 1:  # this motion does not tell which
+            if len(alike) > 1:  # this motion does not distinguish them
                 return f"{NOT_FOUND}: explained alike by: {'; '.join(alike)}"
             if alike:
                 return alike[0]
             faults = " and ".join(faults_in_time(judged))
-            if faults.startswith(UNKNOWN_FAULT):  # where, but not what
+            if faults.startswith(UNKNOWN_FAULT):  # only the time of the fault is known
                 faults = f"{NOT_FOUND}: {faults}"
         except RotorError:
             faults = ""
-        # Defects of wrong equations are the same at any step: those that shrink are the scheme's.
+        # Wrong equations cause the same defects with any step. Defects that shrink with the step
+        # are due to the scheme.
         by_order = ""
         if order >= 1.0 - _ORDER_BAND:
             look_at = "the scheme's coefficients, or loads of another time within a step"
             by_order = f"order {order:.1f} where {claimed:g} is expected: {look_at}"
-        # The first scene that fails decides, as it moves in all its intervals. In a scene that
-        # rests most of the time any error would look like a fault at a time.
+        # The first scene that fails decides for all scenes whether faults at single times are
+        # reported. Its rotor moves in every interval; in a scene in which the rotor rests most of
+        # the time, any error would look like a fault at a single time.
         if self._has_faults_in_time is None:
             self._has_faults_in_time = bool(faults)
         return (faults if self._has_faults_in_time else by_order) or NOT_FOUND
@@ -425,13 +442,14 @@ class _Examination:
     ) -> tuple[float, float]:
         """Return the largest judged defect (rad) with half the step, and the order of the defects.
 
-        The order is the logarithm to base 2 of the ratio of both root mean squares. Both numbers
-        are zero for a method without a step, and where the run with half the step is incomplete.
+        The order is the logarithm to base 2 of the root mean square of the defects with the default
+        step divided by that with half the step. Both returned numbers are zero if the method has no
+        step, or if the run with half the step is incomplete.
 
         Parameters
         ----------
         scene, run : the scene, and the samples of its run with the default step.
-        defects : of that run.
+        defects : interval defects of the run with the default step.
         """
         step = self._method.defaults.get("step")
         if not isinstance(step, float):
@@ -444,7 +462,10 @@ class _Examination:
         return float(half.judged_sizes.max()), float(np.log2(ratio))
 
     def _exact(self, scene: Scene) -> None:
-        """Add a check of the rotor angle against the exact solution of a scene, if it has one."""
+        """Check the rotor angle against the exact solution of a scene.
+
+        Nothing is added if the scene has no exact solution, or if the method refuses the scene.
+        """
         known = exact_rotor_angle(scene, sample_times(scene))
         solution = self._ask(scene)
         if known is None or solution.status == REFUSED:
@@ -452,16 +473,17 @@ class _Examination:
         name, angle = known
         fault = protocol_fault(solution)
         error = np.inf if fault else np.abs(solution.angles[:, 0] - angle).max()
-        # The sum of the defects of all intervals; errors of the falling pendulum grow less than
-        # tenfold in a second.
+        # The bound is the allowed defect of an interval times the number of samples, and a factor
+        # 10: errors of the falling pendulum grow less than tenfold in the second that is computed.
         bound = 10.0 * scene.samples * self._bound
         self._add("exact", scene.name, error, bound, fault or f"{name}, solved analytically", "rad")
 
     def _symmetries(self, scene: Scene) -> None:
-        """Check that mirrored and renumbered initial states give the same motion, transformed.
+        """Check that a transformed initial state gives the transformed motion.
 
-        The blades of `scene` are equal and symmetric. The mirror image turns the signs of all
-        pitches; blade 1 is renumbered to 2, and so on, with the rotor turned back by one blade.
+        The blades of `scene` must be equal and symmetric. Two transformations are checked: the
+        mirror image, which changes the sign of all pitches, and a renumbering, which makes blade 1
+        blade 2 and so on, and turns the rotor back by the angle between two blades.
         """
         (rotor, *pitches), (spin, *rates), blades = (
             scene.initial_angles,
@@ -503,14 +525,14 @@ class _Examination:
             self._add(check, scene.name, error, bound, fault or hints[check], "rad")
 
     def _order(self, scene: Scene) -> None:
-        """Check that the order of convergence of the defects is the one that the method claims.
+        """Check that the defects converge with at least the order that the method claims.
 
-        Nothing is added for a method without a ladder of steps or a claimed order, or where no
-        order can be fitted.
+        A measured order may be lower by up to `_ORDER_BAND`. Nothing is added if the method has no
+        ladder of steps or no claimed order, or if no order can be fitted.
 
         Parameters
         ----------
-        scene : short and smooth; it is run with each step of the ladder.
+        scene : a short scene with a smooth motion; it is run with each step of the ladder.
         """
         ladder = next((one for one in self._method.ladders if one.kind == STEP), None)
         if ladder is None or self._method.order is None:
@@ -528,7 +550,7 @@ class _Examination:
             self._add("order", scene.name, max(claimed - order, 0.0), _ORDER_BAND, hint, "below")
 
     def _stops(self, scene: Scene) -> None:
-        """Check that a run that would take long ends by itself at its time limit."""
+        """Check that a long run stops itself at its time limit, and need not be killed."""
         long = replace(
             scene, duration=_LONG * scene.duration, samples=int(_LONG) * (scene.samples - 1) + 1
         )
@@ -538,12 +560,12 @@ class _Examination:
 
 
 def _wrong_output(scene: Scene, run: Trajectory, check: Check) -> str:
-    """Return what tips, energies or loads are in place of those at the run's own states.
+    """Return a text that says which mistake explains the tips, energies or loads of a run.
 
     Parameters
     ----------
     scene, run : the scene, and the samples of its run.
-    check : a failed check named "tip", "energies" or "loads"; its channel says which array.
+    check : a failed check named "tip", "energies" or "loads"; its channel names the array.
     """
     channel = check.where.channel
     if check.name == "tip":
@@ -551,7 +573,7 @@ def _wrong_output(scene: Scene, run: Trajectory, check: Check) -> str:
     if check.name == "energies":
         text = wrong_energy(scene, run, channel)
     else:
-        # The text of wrong loads has their names.
+        # The text of `wrong_loads` names the loads itself.
         if text := wrong_loads(scene, run):
             return text
         channel = channel.replace("_", " ")
@@ -563,17 +585,17 @@ def _wrong_output(scene: Scene, run: Trajectory, check: Check) -> str:
 
 
 def protocol_fault(solution: Solution) -> str:
-    """Return what is wrong with the form of a run that claims to be complete; "" if nothing is.
+    """Return what is wrong with the form of a run, or why it is incomplete; "" if it is right.
 
-    The rows must be finite, as many as the scene has samples, at its sample times, and with
-    unwrapped angles.
+    A right run reports success. It has a row of finite numbers at every sample time of the scene,
+    and its angles are not wrapped.
 
     Parameters
     ----------
-    solution : not judged; its status is "" if it has samples.
+    solution : a run that is not judged; its status is "" if it has samples.
     """
     scene, run, integration = solution.scene, solution.trajectory, solution.integration
-    if solution.status == "solver_failed":  # without samples
+    if solution.status == "solver_failed":  # the run has no samples
         return f"{NOT_FOUND}; the run raised an error: {solution.message}"
     if solution.status:
         return solution.message
@@ -592,13 +614,14 @@ def protocol_fault(solution: Solution) -> str:
         return f"reports a failure: {integration.message or 'no reason given'}"
     if n > scene.samples or np.abs(run.time - times).max() > 1e-9 * scene.duration:
         return "its times are not the scene's sample times"
-    # The change of each angle beyond the integral of its rate (trapezoidal rule): an angle that is
-    # wrapped changes by a turn more or less.
+    # The change of each angle in an interval, minus the integral of its rate (trapezoidal rule).
+    # Where an angle is wrapped, the difference is about a turn.
     turned = (
         np.diff(run.angles, axis=0)
         - 0.5 * (run.rates[1:] + run.rates[:-1]) * np.diff(times)[:, None]
     )
-    # Rates in a wrong unit give such differences, too, but in neighbouring intervals as well.
+    # Rates in a wrong unit cause such differences, too, but in neighbouring intervals as well. A
+    # wrapped angle has a single one.
     beside = np.full((1, turned.shape[1]), 0.0)
     before, after = np.vstack([beside, turned[:-1]]), np.vstack([turned[1:], beside])
     is_single = np.maximum(np.abs(before), np.abs(after)) < 1.0

@@ -1,8 +1,8 @@
 """Modes of a scene by every model that can be linearized.
 
-They are computed at rest, over rotor speed, and over a turn under gravity. The steady state that
-equations are linearized about is computed by the closed form and passed to all models; each of them
-returns the accelerations that remain there.
+Modes are computed at rest and over rotor speed, and Floquet multipliers over a turn under gravity.
+The closed form computes the steady state, and all models linearize their equations about it. Each
+model also returns its accelerations at this state, which must be nearly zero.
 """
 
 from __future__ import annotations
@@ -37,11 +37,11 @@ from rotor_mbs.solution.trajectory import Array, Linearization
 if TYPE_CHECKING:
     from rotor_mbs.models.lagrange.floquet import Turn
 
-# A source whose accelerations at the steady state are above this share of its largest stiffness is
-# not steady there.
+# A model is not steady at the steady state of the closed form if an acceleration there (rad/s^2) is
+# above this share of its largest stiffness (1/s^2).
 _STEADY = 1e-7
-# Share of the stiffness of the weights, if they did not balance, that is rounding in every model
-# (finite differences).
+# In a balanced rotor the moments of the weights about the shaft cancel. What remains of their
+# stiffness is rounding (by finite differences) up to this share of the stiffness of all weights.
 _STIFFNESS_ROUNDING = 1e-9
 _BALANCED = "balanced rotor: no preferred angle; modes taken at the initial angle"
 
@@ -59,35 +59,38 @@ def modes_of_scenes(
     timeout_s: float,
     on_progress: OnProgress = ignore_progress,
 ) -> list[RunOutcome]:
-    """Compute the modes of every scene into a file; those that it has of other scenes are kept.
+    """Compute the modes of every scene, and store them in a file.
+
+    Modes of other scenes that the file already has are kept.
 
     Parameters
     ----------
     scenes : sequence of Scene
-        A scene without any modes is an outcome with the reason; the others are computed.
+        The scenes. If a scene has no modes, its outcome has the reason, and the other scenes are
+        computed.
     output : Path
-        It is not written where no scene has modes.
+        The file; it is not written if no scene has modes.
     speeds : sequence of float
-        rad/s, of the Campbell diagram and the Floquet multipliers.
+        Rotor speeds of the Campbell diagram and of the Floquet multipliers, rad/s.
     names : sequence of str
-        Methods whose models stand beside the closed form; by default all.
+        Methods whose models are compared with the closed form; if empty, all models.
     workers : int
-        Parallel processes.
+        Number of parallel processes.
     timeout_s : float
         Time limit of each scene, s.
     on_progress : callable
-        Not called for a scene without modes.
+        Called after each scene, except for scenes without modes.
 
     Returns
     -------
     list of RunOutcome
-        One per scene, in the order in which they ended.
+        The outcome of each scene, in the order in which they ended.
 
     Raises
     ------
     InputError
-        For speeds that do not increase, for a method that is not linearized, and if `output` holds
-        another kind of results.
+        If the speeds do not increase, if the model of a method has no linearization, or if `output`
+        holds another kind of results.
     StoreError
         If `output` cannot be written, or was not written by this program.
     """
@@ -111,7 +114,7 @@ def modes_of_scenes(
                     made.append(
                         RunOutcome(label, "", REFUSED, reason, is_stored=False, share=share)
                     )
-                    continue  # the reason is told once, at the end
+                    continue  # the caller reports the reason after all scenes
                 if end.value is None:
                     outcome = RunOutcome(
                         label, "", end.failure, end.message, is_stored=False, share=share
@@ -140,25 +143,26 @@ def modes_of_scenes(
 def compute_modes(
     scene: Scene, speeds: Sequence[float] | Array = (), models: Sequence[str] = ()
 ) -> modal.SceneModes:
-    """Return all modes of a scene.
+    """Compute all modes of a scene.
 
-    They are those at rest under gravity, those in steady rotation without gravity at `speeds`, and
-    the Floquet multipliers of a turn under gravity at the speeds other than 0. The torque on the
-    rotor is left out: the drive holds its speed. Pitch torques and rest angles are those at t = 0.
+    The result has the modes at rest under gravity, the modes in steady rotation without gravity at
+    `speeds`, and the Floquet multipliers of a turn under gravity at all speeds except 0. The rotor
+    torque of the scene is left out: the drive is assumed to hold the speed. Pitch torques and rest
+    angles have their values at t = 0.
 
     Parameters
     ----------
     scene : Scene
         The scene that is linearized.
     speeds : sequence of float
-        rad/s, increasing; below 0 the rotor turns the other way.
+        Rotor speeds, rad/s, increasing; below 0 the rotor turns the other way.
     models : sequence of str
-        The models beside the closed form; by default all.
+        Models that are compared with the closed form; if empty, all models.
 
     Raises
     ------
     InputError
-        For speeds that do not increase, and where there are no modes at all; the message says why.
+        If the speeds do not increase, or if the scene has no modes at all; the message says why.
     """
     notes: list[str] = []
     torques, rests = (
@@ -178,7 +182,7 @@ def compute_modes(
             table = _floquet_table(scene, turning)
         except MethodRefusal as exc:
             notes.append(f"no Floquet multipliers: {exc}")
-    reasons = tuple(dict.fromkeys(notes))  # rest and rotation may have the same
+    reasons = tuple(dict.fromkeys(notes))  # rest and rotation may have the same reason
     if not (rest or rotation or (table is not None and (table.stable >= 0).any())):
         raise InputError("; ".join(reasons))
     return modal.SceneModes(*facts, rest, rotation, table, reasons, label)
@@ -187,16 +191,17 @@ def compute_modes(
 def _linear(
     scene: Scene, kind: str, speeds: Array, models: Sequence[str], notes: list[str]
 ) -> dict[str, modal.LinearModes]:
-    """Return the modes of one kind by model, the closed form first.
+    """Return the modes at rest or in rotation, by model, the closed form first.
 
-    A model that cannot represent one of the speeds is left out; at rest a note says why.
+    A model is left out if it cannot be linearized at one of the speeds, or is not steady there. At
+    rest the reason is added to `notes`; in rotation it is not.
 
     Parameters
     ----------
-    scene : with loads that are constant.
+    scene : the scene; its loads are constant.
     kind : REST or ROTATION.
     speeds : (speeds,) rad/s.
-    models : names beside the closed form; all if there are none.
+    models : names of the models that are compared with the closed form; if empty, all models.
     notes : list to which reasons for missing results are added.
     """
     from rotor_mbs.models.lagrange.linearization import is_balanced, weight_stiffness
@@ -207,7 +212,8 @@ def _linear(
     if not steady:
         notes.append(str(points[0]))
         return {}
-    # All blades and bearings are equal, have equal pitches, and no gravity distinguishes them.
+    # The rotor is symmetric if its blades, bearings and steady pitches are equal, and there is no
+    # gravity.
     bearings = (
         scene.bearing_stiffness,
         scene.bearing_damping,
@@ -222,7 +228,8 @@ def _linear(
         at.gravity == 0.0 and np.ptp(angles[1:]) < 1e-9 for at, angles, _, _ in steady
     )
     columns = scene.moving_coordinates
-    # Of a balanced rotor all stiffness about the shaft may be rounding of the weights.
+    # The stiffness of a balanced rotor about the shaft may be nothing but rounding of the moments
+    # of the weights.
     weight_stiffnesses = [weight_stiffness(at, angles) for at, angles, _, _ in steady]
     is_balanced_rotor = False
     if kind == modal.REST and scene.gravity:
@@ -231,7 +238,7 @@ def _linear(
         notes.append(_BALANCED)
 
     def over_speed(values: Sequence[NDArray[Any]], nothing: complex = np.nan) -> NDArray[Any]:
-        """Return values at all speeds, `nothing` where there is no steady state."""
+        """Return values at all speeds: `nothing` at speeds without a steady state."""
         whole = np.full((len(points), *values[0].shape), nothing, values[0].dtype)
         whole[there] = values
         return whole
@@ -271,7 +278,7 @@ def _linear(
         sets = [modes_at(linear.stiffness, linear.damping) for linear in made]
         if not modes_by_model:
             sets = first_sets = modal.track(sets)
-        else:  # modes of equal frequencies are in the same places for every model
+        else:  # order the modes as those of the closed form, also at equal frequencies
             sets = [
                 modal.in_order_of(first, own) for first, own in zip(first_sets, sets, strict=True)
             ]
@@ -296,25 +303,25 @@ def _linear(
 
 
 def _steady_states(scene: Scene, kind: str, speeds: Array) -> list[_Point | str]:
-    """Return the steady state at each speed; a text with the reason where there is none.
+    """Return the steady state at each speed, or the reason why there is none.
 
     Parameters
     ----------
-    scene : with its gravity, which is left out in rotation.
+    scene : the scene; in rotation its gravity is left out.
     kind : REST or ROTATION.
     speeds : (speeds,) rad/s, increasing.
 
     Returns
     -------
     list of tuple or str
-        (scene as it is linearized, angles (1 + blades,) rad, speed in rad/s, torque in N m that
-        holds it).
+        For each speed (scene as it is linearized, angles (1 + blades,) rad, speed in rad/s, torque
+        in N m that maintains the speed), or a text with the reason.
     """
     from rotor_mbs.models.lagrange.linearization import equilibrium, holding_torque, steady_rotation
 
     at = scene if kind == modal.REST else replace(scene, gravity=0.0)
-    # The pitches at a speed are the initial guess at the next slower one, so that one branch is
-    # followed down to rest. They are the same in both directions of rotation.
+    # The pitches at each speed are the initial guess at the next slower speed, so that one branch
+    # of solutions is followed down to rest. The direction of rotation does not change the pitches.
     start = scene
     points: list[_Point | str] = [""] * len(speeds)
     for place in np.argsort(-np.abs(speeds), kind="stable").tolist():
@@ -333,13 +340,11 @@ def _steady_states(scene: Scene, kind: str, speeds: Array) -> list[_Point | str]
 
 
 def _floquet_table(scene: Scene, speeds: Array) -> modal.FloquetTable:
-    """Return the multipliers of the periodic motion under gravity, computed from the fastest down.
-
-    Each turn starts from the motion at the next faster speed of its direction, if that was found.
+    """Return the Floquet multipliers of the periodic motion under gravity at each speed.
 
     Parameters
     ----------
-    scene : with constant loads.
+    scene : the scene; its loads are constant.
     speeds : (speeds,) rad/s, increasing, without 0.
 
     Raises
@@ -349,7 +354,8 @@ def _floquet_table(scene: Scene, speeds: Array) -> modal.FloquetTable:
     """
     from rotor_mbs.models.lagrange.floquet import periodic_turn
 
-    # From the fastest down: the motion at a speed is the first guess for the next slower one.
+    # In each direction of rotation speeds are computed from the fastest to the slowest. The motion
+    # at a speed, if it was found, is the first guess for the next slower speed.
     by_speed: dict[float, Turn] = {}
     for direction in (speeds[speeds < 0.0], speeds[speeds > 0.0][::-1]):
         guess: Turn | None = None
@@ -364,9 +370,10 @@ def _floquet_table(scene: Scene, speeds: Array) -> modal.FloquetTable:
         modulus = float(np.abs(others).max(initial=0.0))
         is_stable = -1 if turn.message else int(modulus <= 1.0 + modal.GROWTH)
         sizes = np.abs(every)
-        # The product of the multipliers is the exponential of the integrated trace (Liouville).
+        # The product of all multipliers must be the exponential of the integrated trace
+        # (Liouville).
         rounding = np.finfo(float).eps * np.linalg.norm(turn.transition)
-        error = float("nan")  # where rounding leaves under six digits
+        error = float("nan")  # unless rounding leaves at least six digits of the product
         if not turn.message and rounding < 1e-6 * sizes.min():
             error = float(np.log(sizes).sum() - turn.trace_integral)
         rows.append((every, modulus, is_stable, error, turn.torque, turn.mismatch))
@@ -380,14 +387,14 @@ def _floquet_table(scene: Scene, speeds: Array) -> modal.FloquetTable:
 
 
 def increasing_speeds(speeds: Sequence[float] | Array) -> list[float]:
-    """Return rotor speeds (rad/s) as floats.
+    """Return rotor speeds (rad/s) as floats, and check that they increase.
 
     Raises
     ------
     InputError
-        If they do not increase, or one is out of range or a text without a number.
+        If the speeds do not increase, or a speed is out of range or a text without a number.
     TypeError
-        If one of `speeds` cannot be converted at all, such as None.
+        If the type of a speed has no conversion to float, such as None.
     """
     try:
         numbers = [float(speed) for speed in speeds]

@@ -1,7 +1,7 @@
 """Stability suite: every corrected method on the stiff and extreme scenes.
 
-Some methods are also run over ladders of steps. The result is a map: how each method ends on every
-scene, and whether a smaller step helps.
+Methods with a fixed step are also run over ladders of steps. The result is a map, which has the
+outcome of each method on every scene, and shows whether a smaller step helps.
 """
 
 from __future__ import annotations
@@ -35,10 +35,10 @@ from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.studies.bench import Curve, Point, curve_tables, curve_tasks
 from rotor_mbs.studies.run import run_scenes
 
-TARGET = 1e-6  # rad: what a method must reach on the stiff and light scenes
+TARGET = 1e-6  # error in rad for which the ladders look for the step
 
-# Outcomes in the map: the status of a run, or a more specific one, with its symbol and text. The
-# report chooses the colours.
+# Outcomes in the map, each with its symbol and text. An outcome is the status of the run, or
+# "smaller_step", which no run has as its status. The report chooses the colours.
 OUTCOMES = {
     "ok": ("✓", "ok"),
     "smaller_step": ("▾", "ok with a smaller step"),
@@ -58,12 +58,12 @@ class SuiteRun:
 
     Attributes
     ----------
-    scene, method : names.
-    status, message : as stored.
+    scene, method : names of the scene and of the method.
+    status, message : status and message of the stored run.
     outcome : a key of OUTCOMES.
-    false_success : whether the engine reported success of a run that is wrong.
-    has_reference : whether the scene has a reference that is ok.
-    step : s, that an error of 1e-6 rad needs; None where no ladder found it.
+    false_success : whether the engine reported success although the run is wrong.
+    has_reference : whether the scene has a reference with status ok.
+    step : step in s with which the error is 1e-6 rad; None if there is no ladder.
     """
 
     scene: str
@@ -77,12 +77,12 @@ class SuiteRun:
 
     @property
     def folder(self) -> str:
-        """Return the folder of its scene, such as "stiff"."""
+        """Return the folder of the scene, such as "stiff"."""
         return self.scene.partition("/")[0]
 
 
 def suite_runs(path: Path) -> list[SuiteRun]:
-    """Return every run of the results file at `path`, in its order.
+    """Return the outcome of every run in the results file at `path`, in the order of the file.
 
     Raises
     ------
@@ -115,15 +115,16 @@ def suite_runs(path: Path) -> list[SuiteRun]:
 
 
 def suite_table(runs: Sequence[SuiteRun]) -> TextTable:
-    """Return a table of the runs that are ok, by method and folder of scenes.
+    """Return a table with the number of runs that are ok, by method and folder of scenes.
 
-    A cell "12+1 of 14" says that 13 runs are ok, 1 of them only with a smaller step; of the printed
-    equations it is "2 of 2 completed". Runs that are singular in scenes without a reference are not
-    counted: there no motion exists.
+    A cell "12+1 of 14" says that 13 runs are ok, 1 of them only with a smaller step. A cell of the
+    printed equations, such as "2 of 2 completed", has the number of completed runs. Singular runs
+    are not counted if their scene has no reference, because no motion exists there. The last
+    column has the number of wrong runs whose engine reported success.
 
     Parameters
     ----------
-    runs : of any number of scenes and methods.
+    runs : runs of any scenes and methods.
     """
     compared = [run for run in runs if run.has_reference or run.status != "singular"]
     folders = list(dict.fromkeys(run.folder for run in compared))
@@ -137,7 +138,7 @@ def suite_table(runs: Sequence[SuiteRun]) -> TextTable:
             ok, smaller = outcomes.count("ok"), outcomes.count("smaller_step")
             count = f"{ok}+{smaller}" if smaller else f"{ok}"
             text = f"{count} of {len(outcomes)}"
-            if not is_corrected(method):  # never ok
+            if not is_corrected(method):  # its runs never have the status ok
                 text = f"{outcomes.count('completed')} of {len(outcomes)} completed"
             cells.append(text if outcomes else "")
         claimed = sum(run.false_success for run in runs if run.method == method)
@@ -147,19 +148,22 @@ def suite_table(runs: Sequence[SuiteRun]) -> TextTable:
 
 SUITE = ("stiff", "extreme")
 
-# The method that `run` relies on is given enough time for the longest scenes: a map of time-outs
-# shows nothing.
+# The method on which `run` relies has a longer time limit, in s, so that it completes the longest
+# scenes: if it timed out, the map would not show its stability.
 _PATIENT_METHOD, _PATIENT_S = "lagrange/taylor", 120.0
-# A ladder takes a few times its longest run; what is over this is stuck.
+# Time after which the process of a ladder is ended, s. A ladder takes a few times as long as its
+# longest run; a process that takes longer hangs.
 _TASK_LIMIT_S = 40.0
-STEPS = "stability"  # table
+STEPS = "stability"  # name of the table with the points of the ladders
 
-# Each step of a ladder is a quarter of the one before, until the error is well below the target, or
-# a run is expected to take this long.
+# Each step of a ladder is a quarter of the step before. A ladder ends when the error is well below
+# the target, or when the next run is expected to take longer than _LONGEST_RUN_S.
 _FACTOR = 4
 _LONGEST_RUN_S = 1.5
+# Beginnings of the names of scenes for which every method with a fixed step has a ladder.
 _STIFF_OR_LIGHT = ("stiff/", "extreme/light", "extreme/feather")
-# A run that fails at once costs nothing, however small its step.
+# Maximum number of steps of a run, which bounds ladders whose runs all fail at once: these reach no
+# limit of time.
 _MAX_STEPS = 1e7
 
 
@@ -174,36 +178,39 @@ def run_suite(
     settings: Mapping[str, object] | None = None,
     on_progress: OnProgress = ignore_progress,
 ) -> tuple[list[RunOutcome], list[Refusal]]:
-    """Compute the suite on some scenes into a results file.
+    """Compute the runs and ladders of the suite, and store them in a results file.
 
-    What the file has already is kept; records of these scenes that are no longer wanted are
-    dropped.
+    Runs and ladders that the file already has, with the same settings and versions, are kept.
+    Ladders that the runs no longer need are removed.
 
     Parameters
     ----------
     scenes : the scenes.
     output : the results file.
-    workers : parallel processes.
+    workers : number of parallel processes.
     timeout_s : time limit of a run in s.
-    methods : names; all corrected methods if there are none.
-    settings : of the methods that have them, for the runs of the map. Ladders vary the step by
-        themselves.
-    on_progress : called after each run.
+    methods : names of methods; if empty, all corrected methods.
+    settings : settings of the runs; each applies to the methods that have it. They do not apply to
+        the ladders, which vary the step.
+    on_progress : called after each run, and after each ladder.
 
     Returns
     -------
     list of RunOutcome
-        What this call computed, or tried to.
+        Runs and ladders that this call computed, or tried to compute.
     list of Refusal
         Runs that were left out.
 
     Raises
     ------
-    InputError, StoreError
-        InputError also if no run is left.
+    InputError
+        If no method has one of the settings, if no run is left, or if `output` is a file of
+        another kind.
+    StoreError
+        If the file cannot be read or written.
     """
     names = methods or method_names(is_corrected=True)
-    settings_for(list(names), settings or {})  # refuses what no method has
+    settings_for(list(names), settings or {})  # raises if no method has a setting
     asked: dict[str, list[str]] = {}
     refused: list[Refusal] = []
     for scene in scenes:
@@ -219,8 +226,8 @@ def run_suite(
     }
     made: list[RunOutcome] = []
     with pool_of(workers) as pool:
-        # The patient method first: a run that ended at its longer limit is not computed again with
-        # the shorter one.
+        # The method with the longer limit runs first: if its run reached that limit, it is not
+        # computed again with the shorter limit.
         for chosen, limit_s in ((patient, max(timeout_s, _PATIENT_S)), (asked, timeout_s)):
             outcomes = run_scenes(
                 scenes,
@@ -242,22 +249,28 @@ def complete_ladders(
     workers: Workers,
     on_progress: OnProgress = ignore_progress,
 ) -> list[RunOutcome]:
-    """Complete the ladders of steps of these scenes, where the stored runs need them.
+    """Compute the ladders of steps that stored runs need and the file lacks.
 
-    A ladder is needed for methods with a fixed step, on stiff and light scenes and where the run
-    failed at the default step.
+    A run needs a ladder if its method has a fixed step, its scene has a reference, and the scene is
+    stiff or light or the run failed with the default step. Other ladders of these scenes and
+    methods are removed from the file.
 
     Parameters
     ----------
     scenes : the scenes.
-    methods : names of methods by scene name, whose ladders are replaced.
-    output : the results file, which has the runs.
-    workers : parallel processes, or a pool that is open.
+    methods : by scene name, the methods whose ladders are removed if no run needs them.
+    output : the results file; it has the runs.
+    workers : number of parallel processes, or an open pool.
     on_progress : called after each ladder.
+
+    Returns
+    -------
+    list of RunOutcome
+        The ladders that this call computed, or tried to compute.
     """
     by_name = {scene.name: scene for scene in scenes}
-    # Where a fixed step may matter: the stiff and light scenes, and runs that failed at the default
-    # step.
+    # A smaller step may matter on the stiff and light scenes, and for runs that failed with the
+    # default step.
     wanted = [
         (by_name[run.scene], run.method)
         for run in suite_runs(output)
@@ -271,7 +284,6 @@ def complete_ladders(
     ]
     curves = [ladder_curve(scene, method) for scene, method in wanted]
     with locked(output), pool_of(workers) as pool:
-        # Ladders of these scenes and methods that the runs no longer need are removed.
         replaced = [(STEPS, scene, method) for scene, able in methods.items() for method in able]
         file = fit_file_to_request(output, curve_tables(curves), replaced)
         missing = [curve for curve in curves if not curve.is_stored(file)]
@@ -282,9 +294,9 @@ def complete_ladders(
 
 
 def ladder_curve(scene: Scene, method: str) -> Curve:
-    """Return the curve of a scene and method over steps that become smaller by factors of 4.
+    """Return the curve of a scene and method over steps, each a quarter of the step before.
 
-    The first step is the sample interval; the last one is limited by the number of steps of a run.
+    The first step is the sample interval. With the last step a run has at most `_MAX_STEPS` steps.
     """
     steps = [scene.duration / (scene.samples - 1)]
     while scene.duration <= _MAX_STEPS * steps[-1] / _FACTOR:

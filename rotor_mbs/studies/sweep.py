@@ -55,8 +55,8 @@ from rotor_mbs.solution.quantities import energy_balance, quantities
 from rotor_mbs.solution.status import REFUSED, STATUSES, code_of
 from rotor_mbs.solution.trajectory import Array, RunBlock, Solution, Trajectory
 
-# Every `Method.solve_many` computes the quantities of these entries of a scene's `outputs`. The entry
-# "" is that of quantities that no scene requests by name.
+# Entries of a scene's `outputs` whose quantities every `Method.solve_many` computes. The entry ""
+# has the quantities that no scene requests by name.
 _SIDE_BY_SIDE = ("", "angles", "rates", "tip", "energy")
 _OF_DEFECTS = ("defect_max", "defect_median", "defect_time", "angle_error_predicted")
 _GRACE_S = 5.0  # time in which a run that reached its time limit ends itself and stores its row
