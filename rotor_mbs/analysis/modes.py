@@ -312,8 +312,8 @@ def floquet(
     """Return the Floquet multipliers of a turn: all of them, and those that are not always 1.
 
     Every periodic motion has a multiplier 1, and a motion with a conserved quantity has a second
-    one. The motion is stable if no other multiplier has a modulus above 1, up to `GROWTH`. Both
-    arrays are sorted by modulus, the largest first.
+    multiplier 1. The motion is stable if no other multiplier has a modulus above 1, up to `GROWTH`.
+    Both arrays are sorted by modulus, the largest first.
 
     Parameters
     ----------
@@ -566,10 +566,11 @@ class SceneModes:
     def disagreement(self) -> float:
         """Return the largest difference between the closed form and another model.
 
-        It is 0 if there is only one model. The difference of a mode is that of the larger modulus
-        of its two eigenvalues, or that of their mean real part, divided by the largest eigenvalue
-        of all modes. For an eigenvalue below a thousandth of the largest, it is the residual of the
-        closed form's mode in the equations of the other model, see `LinearModes.residual`.
+        The value is 0 if there is only one model. Two numbers of each mode are compared: the larger
+        modulus of its two eigenvalues, and their mean real part. Their differences are divided by
+        the largest eigenvalue of all modes. Eigenvalues below a thousandth of the largest are not
+        compared. Instead, the closed form's mode is inserted into the equations of the other model,
+        and its residual counts as the difference, see `LinearModes.residual`.
         """
         largest = 0.0
         for kind in (self.rest, self.rotation):

@@ -2,7 +2,7 @@
 
 The commands `run`, `reproduce` and `reference` are in `cli.runs`, `check` and `test-method` in
 `cli.verdicts`. A command imports the modules that only it needs when it is called. Therefore `list`
-loads no code that reads scenes, and `report` loads no model.
+does not load `scenario.scene`, and `report` loads no model.
 """
 
 from __future__ import annotations

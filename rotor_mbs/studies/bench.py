@@ -371,8 +371,8 @@ def _warm_all(
         ladder[rung].warm_up()
         warm_s += ladder[rung].warm_s
         if rung + 1 < len(ladder):
-            # The next run is expected to take longer than this one by the factor between this one
-            # and the one before; the factor is limited to 2 to 10.
+            # The last two run times of the ladder give a growth factor, limited to 2 to 10. The
+            # next run is expected to take longer by this factor.
             last, before = ladder[rung].warm_s, ladder[rung - 1].warm_s if rung else 0.0
             growth = last / before if before > 0.0 else 2.0
             heapq.heappush(waiting, (last * min(max(growth, 2.0), 10.0), rung + 1, number))
@@ -592,8 +592,8 @@ def run_bench(
 ) -> tuple[list[RunOutcome], list[Refusal]]:
     """Measure the curves of every scene, and store them in a results file.
 
-    A curve that the file has is measured again only if what was requested or the versions differ,
-    or if the reference of its scene was computed again.
+    A curve that the file has is measured again only if its settings or versions differ, or if the
+    reference of its scene was computed again.
 
     Parameters
     ----------

@@ -190,7 +190,7 @@ def judge_file(path: Path, bounds: Bounds) -> list[Check]:
             )
             for file in {known.path for known in frozen if known is not None}
         ]
-        with reading(path):  # an error in this block is reported as one of `path`
+        with reading(path):  # an error in this block is reported as an error in `path`
             checks = checks_of(results, shipped, bounds)
     runs = TableFile(path, [RUNS]).tables.get(RUNS)
     missing = 0 if runs is None else int((runs.column("status") == MISSING).sum())
@@ -230,7 +230,7 @@ def runs_gone(path: Path, earlier: Path) -> Check:
 def scenes_checked(path: Path | None) -> dict[str, Scene]:
     """Return the scenes of a file by name.
 
-    A sweep has one: the base scene, whose parameters are varied.
+    A sweep has a single scene: the base scene, whose parameters are varied.
 
     Parameters
     ----------
@@ -375,8 +375,8 @@ def regressions(
 ) -> list[Check]:
     """Compare the checks of a file with those of an earlier file.
 
-    For each check of the earlier file there is one whose value is the factor by which the margin
-    has shrunk. It fails if the factor is above ten. The value is
+    For each check of the earlier file a new check is returned. Its value is the factor by which the
+    margin has shrunk, and it fails if the factor is above ten. Special values are
 
     - NaN, which fails, if `new` lacks the check;
     - infinite if the check passed before and fails now;
@@ -407,8 +407,7 @@ def regressions(
         if now is None:
             value, hint = math.nan, "checked in the earlier file, missing in this one"
         else:
-            # These values are for a check that fails now; the branches below are for one that
-            # passes.
+            # The value if the check fails now. The branches below are for a check that passes now.
             value = math.inf if check.passed else 1.0
             if now.passed and check.passed:
                 before, after = max(check.value, _ROUNDING), max(now.value, _ROUNDING)

@@ -620,8 +620,8 @@ def protocol_fault(solution: Solution) -> str:
         np.diff(run.angles, axis=0)
         - 0.5 * (run.rates[1:] + run.rates[:-1]) * np.diff(times)[:, None]
     )
-    # Rates in a wrong unit cause such differences, too, but in neighbouring intervals as well. A
-    # wrapped angle has a single one.
+    # Rates in a wrong unit cause large differences, too, but in neighbouring intervals as well. A
+    # wrapped angle causes a single large difference.
     beside = np.full((1, turned.shape[1]), 0.0)
     before, after = np.vstack([beside, turned[:-1]]), np.vstack([turned[1:], beside])
     is_single = np.maximum(np.abs(before), np.abs(after)) < 1.0

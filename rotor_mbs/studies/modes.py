@@ -40,8 +40,9 @@ if TYPE_CHECKING:
 # A model is not steady at the steady state of the closed form if an acceleration there (rad/s^2) is
 # above this share of its largest stiffness (1/s^2).
 _STEADY = 1e-7
-# In a balanced rotor the moments of the weights about the shaft cancel. What remains of their
-# stiffness is rounding (by finite differences) up to this share of the stiffness of all weights.
+# In a balanced rotor the moments of the weights about the shaft cancel. The remaining stiffness is
+# rounding of finite differences, up to this share of the stiffness that the weights would have if
+# they did not balance.
 _STIFFNESS_ROUNDING = 1e-9
 _BALANCED = "balanced rotor: no preferred angle; modes taken at the initial angle"
 

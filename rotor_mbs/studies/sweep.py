@@ -118,7 +118,7 @@ class Chunk(Task):
                 except OutOfTimeError as exc:
                     each.append(self.part(i, i + 1).failed("timed_out", str(exc)))
             rows = {name: np.concatenate([row[name] for row in each]) for name in each[0]}
-        # The error growth is a property of the scene: for every method it is computed by the closed
+        # The error growth is a property of the scene. For every method it is computed by the closed
         # form, from its variational equations.
         if "error_growth" in rows:
             for i, scene in enumerate(scenes):
