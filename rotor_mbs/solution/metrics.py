@@ -2,7 +2,8 @@
 
 Runs, reports and checks use the same metrics.
 
-`METRICS` declares each of them once: its unit, and which tables of a file have it.
+`METRICS` declares the unit of each metric, and the tables of a file that have it. The metrics of
+output quantities are declared with the quantities, in `solution.quantities`.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from rotor_mbs.solution.quantities import (
 )
 from rotor_mbs.solution.trajectory import Trajectory
 
-# At the horizon of a scene an error of the initial state may have grown this many times.
+# The horizon of a scene is the last sample before the error growth reaches this factor.
 HORIZON_GROWTH = 1e5
 
 Metrics = dict[str, float]
@@ -33,16 +34,17 @@ Metrics = dict[str, float]
 
 @dataclass(frozen=True)
 class RowValue:
-    """Declare a number or text in the row of a run, or of a point, in a file.
+    """Declare a computed value, a number or a text, in the row of a run or of a point in a file.
 
     Attributes
     ----------
-    units, long_name : what it is.
+    units, long_name : attributes of its column in the file.
     tables : names of the tables that have it, separated by blanks: "runs", "bench", "stability",
-        "sweep", and "sweep_growth" for sweeps that ask for the error growth.
-    kind : its type in the file; "S1" for a text.
-    rounding : on other hardware the value may differ by this many times the run's `defect_floor`.
-    is_main : whether it is shown first of all.
+        "sweep", and "sweep_growth" for sweeps that request the error growth.
+    kind : NumPy type of the column in the file; "S1" for a text.
+    rounding : factor that decides how far the value may differ on other hardware: by this factor
+        times `FLOOR_SAFETY` times the run's `defect_floor`.
+    is_main : whether the summary of a run in Python shows it.
     """
 
     units: str
@@ -55,8 +57,8 @@ class RowValue:
 
 _OWN_POINTS = "of printed/ode45 over ode45's own output points instead"
 _ALL, _BENCH = "runs bench stability", "runs bench"  # see `RowValue.tables`
-# Each metric, in the order of the columns. Those of quantities are declared with them, see
-# `Quantity`.
+# All metrics in the order of their columns, without those that `Quantity.judgement` declares for
+# the table of runs.
 METRICS = {
     "energy_scale_J": RowValue("J", "energy scale, to which energy errors are relative"),
     "energy_drift_max": RowValue(
@@ -161,19 +163,19 @@ METRICS = {
     "pitch_max": RowValue("rad", "largest magnitude of a pitch angle", "sweep", is_main=True),
 }
 
-# rad: beyond it a double's last digit is above 1e-10 rad, so that neither its sine nor an error of
-# 1e-9 rad is meaningful.
+# Largest angle that can be judged, rad. The last digit of a larger double is above 1e-10 rad, so
+# that neither its sine nor an error of 1e-9 rad is meaningful.
 ANGLE_LIMIT = 1e6
 
-# rad: a pitch angle that leaves zero grows exponentially between these sizes. Below them it is
-# round-off, above them its motion is no longer linear.
+# A pitch angle that leaves zero grows exponentially while its magnitude is between these limits,
+# rad. A smaller angle is round-off. The motion of a larger one is no longer linear.
 _LINEAR_FROM, _LINEAR_TO = 1e-12, 1e-2
 
 
 def running_growth(reference: Trajectory) -> Array:
-    """Return the largest error growth so far, at least 1, at each sample: (n,).
+    """Return the largest error growth up to each sample, at least 1: (n,).
 
-    It is 1 without a stored growth.
+    It is 1 at all samples if the reference has no array of the error growth.
     """
     growth = reference.get("error_growth")
     if growth is None:
@@ -182,9 +184,9 @@ def running_growth(reference: Trajectory) -> Array:
 
 
 def horizon_samples(reference: Trajectory) -> int:
-    """Return the number of samples before the horizon.
+    """Return the number of samples up to the horizon.
 
-    It is the number of all samples where the growth stays below HORIZON_GROWTH.
+    All samples are counted if the error growth stays below HORIZON_GROWTH.
     """
     beyond = running_growth(reference) >= HORIZON_GROWTH
     return int(np.argmax(beyond)) if beyond.any() else len(beyond)
@@ -196,9 +198,10 @@ def horizon(reference: Trajectory) -> float:
 
 
 def angle_error(run: Trajectory, reference: Trajectory) -> Array:
-    """Return the largest error of the angles over the coordinates, (common samples,) rad.
+    """Return the largest angle error at each common sample, (common samples,) rad.
 
-    Angles are unwrapped: a lost turn is an error of 2π.
+    The largest is taken over the coordinates. Angles are unwrapped, so that a lost turn is an error
+    of 2π.
 
     Parameters
     ----------
@@ -209,14 +212,15 @@ def angle_error(run: Trajectory, reference: Trajectory) -> Array:
 
 
 def energy_scale(scene: Scene, run: Trajectory) -> float:
-    """Return the energy (J) that errors are relative to; zero only where nothing moves.
+    """Return the energy scale (J), to which energy errors are relative.
 
-    It is Σ m g |r| + kinetic and spring energy at the start + largest |work|.
+    The scale is Σ m g |r| + kinetic and spring energy at the start + largest |work|. It is zero
+    only if nothing moves.
 
     Parameters
     ----------
-    scene : its weights and springs are used.
-    run : its kinetic energy and work are used, where it has them.
+    scene : the blades' masses and the springs are used.
+    run : the arrays of kinetic energy and work are used, if the run has them.
     """
     weights = sum(
         blade.mass * scene.gravity * float(np.linalg.norm(blade.centre_of_mass))
@@ -243,23 +247,23 @@ def metrics_of(
     *,
     is_corrected: bool = True,
 ) -> Metrics:
-    """Return the metrics stored with a run, by the names of the file format.
+    """Return the metrics that are stored with a run, by their names in the file.
 
-    Those that cannot be computed are left out.
+    Metrics that cannot be computed are left out.
 
     Parameters
     ----------
-    scene, run : a run without samples has no metrics.
-    reference : of the scene; None without one.
-    defects : of the run; None where they are not known.
-    is_corrected : whether the run claims the equations of the defects, so that their sum predicts
-        its error.
+    scene, run : the scene and the samples of the run. A run without samples has no metrics.
+    reference : samples of the scene's reference; None if it has none.
+    defects : interval defects of the run; None if they are not computed.
+    is_corrected : whether the run claims the corrected equations, which the defects are computed
+        by. Only then the sum of the defects predicts the error of the run.
     """
     metrics: Metrics = {}
     if not len(run.time):
         return metrics
     energy = energy_error(run)
-    # the error of the first sample is zero by definition
+    # The energy error of the first sample is zero by definition: a second one is needed.
     if energy is not None and len(energy) > 1:
         scale = energy_scale(scene, run)
         metrics["energy_scale_J"] = scale
@@ -267,19 +271,21 @@ def metrics_of(
             float(np.abs(energy).max()) / scale if scale else float(np.abs(energy).max())
         )
         metrics["energy_gain_J"] = float(energy.max())
-    until = len(run.time)  # samples up to the horizon
+    until = len(run.time)  # number of samples up to the horizon
     if reference is not None:
         until = min(until, horizon_samples(reference))
         if len(reference.time) and scene.wants("angles"):
             metrics |= _angle_errors(run, reference, until)
     if defects is not None:
         metrics |= defect_metrics(defects, metrics.get("horizon_s"), is_corrected=is_corrected)
-    # Extremes of the rotor over the integrator's own output points, where the run has them.
+    # The extremes of the rotor are taken over the integrator's own output points, if the run has
+    # them.
     own = run.refined or run
     metrics["rotor_angle_min"] = float(own.angles[:, 0].min())
     metrics["rotor_angle_max"] = float(own.angles[:, 0].max())
     metrics["rotor_rate_max"] = float(np.abs(own.rates[:, 0]).max())
-    # of each quantity: its largest size, the time of that in s, and the blade, from 1
+    # The peak of a quantity: its largest magnitude, the time (s) at which it occurs, and the number
+    # of the blade, from 1.
     peaks: Metrics = {}
     for quantity in known_quantities(scene.outputs):
         values = array_of(quantity, scene, run) if quantity.has_peak else None
@@ -297,7 +303,8 @@ def metrics_of(
         if rule is None or errors is None:
             continue
         if rule.with_reference and reference is not None and not rule.at_own_state:
-            # the first sample is given, and equal in every run
+            # The first sample is the initial state, which is equal in every run. An error needs a
+            # second sample.
             errors = errors[: until if until > 1 else 0]
         if len(errors):
             metrics[rule.metric] = float(errors.max()) / (
@@ -309,12 +316,14 @@ def metrics_of(
 def defect_metrics(
     defects: Defects, horizon_s: float | None, *, is_corrected: bool = True
 ) -> Metrics:
-    """Return the metrics of a run's interval defects; those that are NaN are left out.
+    """Return the metrics of a run's interval defects.
+
+    Metrics that are NaN are left out.
 
     Parameters
     ----------
-    defects : of the run.
-    horizon_s : that of the reference; None to find it from the defects.
+    defects : interval defects of the run.
+    horizon_s : horizon of the reference, s; None if it is to be computed from the defects.
     is_corrected : see `metrics_of`.
     """
     metrics = {
@@ -328,8 +337,8 @@ def defect_metrics(
         if horizon_s is None:
             until = defects.horizon_samples(HORIZON_GROWTH)
             horizon_s = float(defects.time[max(until - 1, 0)])
-        # Not of the printed equations: it needs the transition matrices of all intervals, which
-        # take longer than the defects.
+        # These metrics are not computed for the printed equations, because they need the transition
+        # matrices of all intervals, which take longer to compute than the defects.
         floor = defects.floor
         metrics |= {
             "defect_floor": float(floor[np.isfinite(floor)].max(initial=0.0)),
@@ -344,25 +353,30 @@ def defect_metrics(
 
 
 def worst_interval(defects: Defects, *, is_corrected: bool = True) -> int:
-    """Return the number of the interval that is furthest beyond its bound.
+    """Return the number, from 0, of the interval whose defect is furthest beyond its bound.
+
+    The interval with the largest defect is returned if no defect is beyond rounding, or if the run
+    does not claim the corrected equations.
 
     Parameters
     ----------
-    defects : of the run; if none exceeds rounding, the largest defect decides.
-    is_corrected : if false, the largest defect decides, too.
+    defects : interval defects of the run.
+    is_corrected : whether the run claims the corrected equations.
     """
     judged = defects.judged_sizes if is_corrected else np.zeros(1)
     return int(judged.argmax()) if judged.any() else int(defects.sizes.argmax())
 
 
 def interval_metrics(defects: Defects, interval: int, *, is_corrected: bool = True) -> Metrics:
-    """Return the metrics of one interval; those of the worst one are stored with the run.
+    """Return the metrics of one interval: its end, its defect beyond rounding, its judged value.
+
+    The metrics of the worst interval are stored with the run.
 
     Parameters
     ----------
-    defects : of the run.
+    defects : interval defects of the run.
     interval : number of the interval, from 0.
-    is_corrected : whether the excess and the judged value are returned beside the interval's end.
+    is_corrected : if false, only the end of the interval is returned.
     """
     metrics = {"defect_time": float(defects.time[1 + interval])}
     if is_corrected:
@@ -372,28 +386,28 @@ def interval_metrics(defects: Defects, interval: int, *, is_corrected: bool = Tr
 
 
 def _angle_errors(run: Trajectory, reference: Trajectory, until: int) -> Metrics:
-    """Return the metrics of the errors of angles.
+    """Return the metrics of the angle errors, and of pitches that should stay at zero.
 
-    The first sample is given and equal in every run, so that an error up to the horizon or over the
-    run needs a second sample.
+    The first sample is the initial state, which is equal in every run. An error up to the horizon
+    or over the run is therefore returned only if there is a second sample.
 
     Parameters
     ----------
-    run, reference : both with angles.
+    run, reference : samples of the run and of the reference, both with angles.
     until : number of samples up to the horizon.
     """
     error = angle_error(run, reference)
     metrics: Metrics = {}
-    # Pitches that are exactly zero in the reference: whether they stay zero, and if not, when and
-    # how fast they leave it.
+    # Some pitches are exactly zero in the reference. Their metrics say whether they stay at zero in
+    # the run, and if not, when and how fast they leave zero.
     zero = [i for i in range(1, reference.angles.shape[1]) if not reference.angles[:, i].any()]
     if zero:
         away = np.abs(run.angles[:, zero]).max(axis=1)
         metrics["zero_pitch_max"] = float(away.max())
         if (away > LEFT_ZERO).any():
             metrics["zero_pitch_left_s"] = float(run.time[int(np.argmax(away > LEFT_ZERO))])
-            # Exponential growth is a straight line in the logarithm. It is fitted from above
-            # round-off to where the motion ceases to be linear.
+            # The logarithm of an exponential growth is a straight line over time. The line is
+            # fitted to samples above round-off, up to where the motion is no longer linear.
             large = away >= _LINEAR_TO
             linear_until = int(np.argmax(large)) if large.any() else len(away)
             linear = (away > _LINEAR_FROM) & (np.arange(len(away)) < linear_until)
@@ -425,7 +439,7 @@ def largest(values: Array) -> Array:
 
 
 def extremes(values: Array) -> tuple[Array, Array]:
-    """Return the smallest and the largest value of each row of (k, n) values, twice (k,).
+    """Return the smallest and the largest value of each row of (k, n) values, each (k,).
 
     Samples that are not finite are ignored.
     """
@@ -438,16 +452,17 @@ def extremes(values: Array) -> tuple[Array, Array]:
 
 
 def energy_drifts(scenes: Sequence[Scene], kinetic: Array, work: Array, errors: Array) -> Array:
-    """Return the largest energy error of each of k runs, relative to its scale, (k,).
+    """Return the largest energy error of each of k runs, relative to its energy scale, (k,).
 
-    It is in J where the scale is zero. NaN samples are ignored.
+    The error is in J if the energy scale is zero. Samples that are not finite are ignored.
 
     Parameters
     ----------
-    scenes : of the runs.
-    kinetic, work, errors : (k, n) J over the samples.
+    scenes : scene of each run.
+    kinetic, work, errors : (k, n) J, kinetic energy, work and energy error at the samples.
     """
-    # As `energy_scale`: weights and springs of each scene at rest, then what depends on the run.
+    # The energy scales are sums as in `energy_scale`. Its terms from weights and springs are
+    # computed for a run at rest; the kinetic energy and the work of each run are added.
     nothing = np.zeros((1, 1))
     still = Trajectory(nothing[0], nothing, nothing)
     at_rest = np.array([energy_scale(scene, still) for scene in scenes])

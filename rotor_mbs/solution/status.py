@@ -1,7 +1,7 @@
-"""Statuses of runs: how a run ended, and the integer codes of files.
+"""Define the statuses of runs, which say how a run ended, and their integer codes in files.
 
-Files have CF's `flag_values` and `flag_meanings`, so that the order of the list may differ between
-files.
+For other programs, files have the meaning of each code in CF's attributes `flag_values` and
+`flag_meanings`.
 """
 
 from __future__ import annotations
@@ -10,10 +10,11 @@ import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-# Outcomes of a run ("unchecked": complete, but it cannot be judged; "completed": a run of the
-# printed equations that reached the end, whose accuracy is not judged), of a point that was not run
-# ("left_out"), and of a run whose process died. Codes are places in this list: new ones go to its
-# end.
+# "unchecked": the run reached the end of the scene, but cannot be judged, or only in part.
+# "completed": a run of the printed equations reached the end; its accuracy is not judged.
+# "left_out": a bench or a ladder did not run this point.
+# "worker_died": the process that computed the run died.
+# The code of a status is its place in this list, so that new statuses are added at the end.
 STATUSES = (
     "ok",
     "inaccurate",
@@ -26,19 +27,20 @@ STATUSES = (
     "unchecked",
     "completed",
 )
-# Those of runs that reached the end.
+# Statuses of runs that reached the end of the scene.
 COMPLETE = ("ok", "inaccurate", "unchecked", "completed")
 
-# In place of a status: there is no run, as its method cannot represent the scene; nothing is
-# stored.
+# This text stands in place of a status where a method cannot represent the scene. Then there is no
+# run, and nothing is stored.
 REFUSED = "refused"
 
-# Statuses that need no attention: an "ok" run is accurate, a "completed" one can be no better.
+# Statuses that need no attention. An "ok" run is accurate; "completed" is the best status that a
+# run of the printed equations can have.
 GOOD = ("ok", "completed")
 
 
-# rad: the largest error of an angle, up to the horizon, and the largest defect beyond rounding, of
-# a run that is ok.
+# Limit for a run that is ok, rad. It applies to the angle error up to the horizon, and to the
+# defects beyond rounding.
 OK_ERROR = 0.01
 
 
@@ -48,15 +50,19 @@ def code_of(status: str) -> int:
 
 
 class Comparison(NamedTuple):
-    """Hold what a status follows from, as texts for a table; "" for what a run does not have.
+    """Hold the numbers from which the status of a run follows, as texts for a table.
+
+    A text is "" if the run does not have the number.
 
     Attributes
     ----------
-    defect, allowed : rad, the defect furthest beyond rounding and what is allowed in its interval,
-        or "rounding".
-    error : rad, the largest angle error up to the horizon; predicted from the defects without a
-        reference.
-    compared : until when, of which duration.
+    defect : rad, defect beyond rounding in the interval that is furthest beyond its bound; the
+        largest defect if no defect is beyond rounding.
+    allowed : rad, largest defect beyond rounding that is allowed in this interval; "rounding" if no
+        defect is beyond rounding.
+    error : rad, largest angle error up to the horizon. Without a reference it is predicted from
+        the defects, and "predicted" follows the number.
+    compared : the horizon and the duration of the scene, such as "6.15 of 10 s".
     """
 
     defect: str
@@ -66,12 +72,12 @@ class Comparison(NamedTuple):
 
 
 def comparison(metrics: Mapping[str, Any], duration: float) -> Comparison:
-    """Return what a status follows from, as texts.
+    """Return the numbers from which the status of a run follows, as texts for a table.
 
     Parameters
     ----------
-    metrics : of a run, by name.
-    duration : of its scene, s.
+    metrics : metrics of the run by name.
+    duration : duration of the run's scene, s.
     """
     excess, allowed = metrics.get("defect_excess"), metrics.get("defect_allowed")
     defect = excess or metrics.get("defect_max")
@@ -87,10 +93,10 @@ def comparison(metrics: Mapping[str, Any], duration: float) -> Comparison:
 
 
 def _seconds(time: float) -> str:
-    """Return a time in s with three digits, or as a whole number from 1000 s."""
+    """Return a time in s as text: with three digits below 1000 s, else as a whole number."""
     return f"{time:.3g}" if time < 1000.0 else f"{time:.0f}"
 
 
 def short_number(value: object) -> str:
-    """Return a number with two digits; "" for None and what is not a finite float."""
+    """Return a number as text with two digits; "" for any value that is not a finite float."""
     return f"{value:.1e}" if isinstance(value, float) and math.isfinite(value) else ""
