@@ -1,7 +1,7 @@
-"""Output quantities of a run, each declared once.
+"""Declare the output quantities of a run, each once.
 
-A declaration has dimensions, units, who computes the quantity, and how it is judged and plotted.
-Further ones come from packages that have an entry point in the group `rotor_mbs.quantities`.
+A declaration says which dimensions and units a quantity has, who computes it, and how it is judged
+and plotted. Other packages add quantities by an entry point in the group `rotor_mbs.quantities`.
 """
 
 from __future__ import annotations
@@ -29,22 +29,24 @@ Array = NDArray[np.float64]
 class QuantityMetric:
     """Declare a metric that is computed from a quantity, and the largest value that passes.
 
-    It is stored with the run. The metric is the largest magnitude over all samples (of the vectors,
-    if the last dimension is `axis`).
+    The metric is stored with the run. It is the largest magnitude of the quantity, or of its
+    difference from another array, over all samples. If the last dimension is `axis`, the magnitude
+    is the length of a vector.
 
     Attributes
     ----------
     metric : name of the metric.
-    with_reference : whether it is that of the difference from the reference's array, up to the
-        horizon.
+    with_reference : whether the metric is computed from the difference from the reference's array,
+        up to the horizon.
     relative_to : (scene) -> number by which the metric is divided for the check; None for 1.
-    at_own_state : whether it is that of the difference from the array of the closed form at the
-        run's own state, over all samples.
+    at_own_state : whether the array of the closed form at the run's own states takes the place of
+        the reference's array. The metric is then computed over all samples.
     scale_of : (scene, samples) -> number by which the metric is divided before it is stored; None
         for 1.
-    check : name of a check in reference/accuracy.toml that has the bound; "" if `bound` is used.
-    bound : largest value that passes, unless a check has one; None if the metric is not checked.
-    channel, unit : name and unit of the value in verdicts.
+    check : name of the check whose bound in reference/accuracy.toml applies; "" if `bound` does.
+    bound : largest value that passes if no bound of a check applies; None if the metric is then not
+        checked.
+    channel, unit : name and unit of the value in the message of a check.
     fault : message for a value that does not pass, with the field {value}.
     look_at : probable cause of a failure.
     """
@@ -68,7 +70,7 @@ class Plot:
 
     Attributes
     ----------
-    title, axis : title, and label of the vertical axis.
+    title, axis : title of the plot, and label of its vertical axis.
     logarithmic : whether the vertical axis is logarithmic.
     """
 
@@ -83,17 +85,19 @@ class Quantity:
 
     Attributes
     ----------
-    name : name of the dataset, and of the attribute of a `Run`.
-    dimensions : names of the axes: "time", then any of "coordinate", "blade" and "axis".
-    units, long_name : as stored.
-    output : entry of a scene's `outputs` that requests it; "" if it is stored whenever the model
-        computes it.
-    producer : (scene, samples) -> array, a formula for all methods; returns None if it lacks input.
-        None if each model computes the quantity from its own state.
-    required : whether every run of a built-in method must have it where its scene requests it.
-    judgement : how it is checked; None if it is not, or by a rule of its own.
-    plot : how it is plotted; None if it has no plot of its own.
-    has_peak : whether its largest magnitude and the time of that are metrics of a run.
+    name : name of the dataset in a file, and of the attribute of a `Run`.
+    dimensions : names of the array's axes: "time", then any of "coordinate", "blade" and "axis".
+    units, long_name : attributes of the dataset.
+    output : entry of a scene's `outputs` that requests the quantity; "" if the quantity is stored
+        whenever the model computes it.
+    producer : (scene, samples) -> array, a formula that computes the quantity for all methods. The
+        formula returns None if an array that it needs is missing. None if each model computes the
+        quantity itself.
+    required : whether every run of a built-in method must have the quantity if its scene requests
+        it.
+    judgement : how the quantity is checked; None if it is not checked, or by code of its own.
+    plot : how the quantity is plotted; None if it has no plot of its own.
+    has_peak : whether the largest magnitude and the time at which it occurs are metrics of a run.
 
     Examples
     --------
@@ -119,7 +123,8 @@ class Quantity:
 
 # ---- Dimensions
 
-# The arrays that number them.
+# The values along each dimension are an array in the file: times, or numbers of coordinates, blades
+# and axes.
 SCALES = {
     scale.name: scale
     for scale in (
@@ -141,9 +146,9 @@ def sample_times(scene: Scene) -> Array:
 
 
 def scale_values(scene: Scene) -> dict[str, NDArray[np.float64] | NDArray[np.int64]]:
-    """Return the scales of a complete run by name.
+    """Return the values along each dimension of a complete run, by name of the dimension.
 
-    They are the time in s, and the numbers of coordinates, blades and axes.
+    The values are times in s, and the numbers of coordinates, blades and axes.
     """
     blades = len(scene.blades)
     return {
@@ -163,21 +168,28 @@ def row_shape(quantity: Quantity, scene: Scene) -> tuple[int, ...]:
 # ---- Built-in quantities, and what their declarations compute
 
 
-@np.errstate(over="ignore", invalid="ignore")  # of a runaway: the judgement sees what is not finite
+# Energies of a run that diverges may overflow. No warning is needed, because the judgement of the
+# run rejects values that are not finite.
+@np.errstate(over="ignore", invalid="ignore")
 def energy_balance(kinetic: Array, potential: Array, work: Array) -> Array:
-    """Return total energy minus work, minus its value at the start: (..., n) J.
+    """Return the total energy minus the work, minus the initial value of this difference.
 
     Parameters
     ----------
-    kinetic, potential, work : (..., n) J, of one run or of many.
+    kinetic, potential, work : (..., n) J, energies and work at the samples of one run or of many.
+
+    Returns
+    -------
+    ndarray, shape (..., n)
+        J.
     """
     total = kinetic + potential - work
-    error: Array = total - total[..., :1]  # of a run without a sample, too
+    error: Array = total - total[..., :1]  # a slice, so that a run without samples is no error
     return error
 
 
 def energy_error(samples: Trajectory) -> Array | None:
-    """Return the energy balance of a run, (n,) J; None where energies were not requested."""
+    """Return the energy balance of a run, (n,) J; None if the run has no energies or work."""
     kinetic, potential, work = (
         samples.get(name) for name in ("kinetic_energy", "potential_energy", "work")
     )
@@ -189,21 +201,21 @@ def energy_error(samples: Trajectory) -> Array | None:
 def longest_arm(scene: Scene) -> float:
     """Return the largest distance (m) of a blade's centre of mass from the hub's centre.
 
-    It is 1 where all of them are there.
+    The result is 1 if all centres of mass are at the hub's centre, so that it can be divided by.
     """
     return max(math.hypot(*blade.centre_of_mass) for blade in scene.blades) or 1.0
 
 
 def _largest_root_force(_scene: Scene, run: Trajectory) -> float:
-    """Return the largest root force (N) over the blades and the samples; 1 where there is none."""
+    """Return the largest root force (N) over the blades and samples; 1 if missing or zero."""
     forces = run.get("blade_root_force")
     return 1.0 if forces is None else float(np.linalg.norm(forces, axis=-1).max(initial=0.0)) or 1.0
 
 
 def _largest_root_force_at_arm(scene: Scene, run: Trajectory) -> float:
-    """Return the largest root force times the longest arm (N m).
+    """Return the largest root force times the longest arm (N m), the scale of moments.
 
-    It is a scale for moments, which may all be nearly zero.
+    The largest moment is no suitable scale, because all moments may be nearly zero.
     """
     return _largest_root_force(scene, run) * longest_arm(scene)
 
@@ -211,12 +223,13 @@ def _largest_root_force_at_arm(scene: Scene, run: Trajectory) -> float:
 def _load(
     name: str, dimensions: tuple[str, ...], long_name: str, title: str, look_at: str
 ) -> Quantity:
-    """Return the declaration of a load, which is compared with the closed form at the run's state.
+    """Return the declaration of a load, which is compared with the closed form at the run's states.
 
     Parameters
     ----------
-    name, dimensions, long_name : of the quantity; a name that ends with "force" has the unit N.
-    title : of its plot.
+    name, long_name : see `Quantity`. The unit is N for a name that ends with "force", else N m.
+    dimensions : names of the axes after "time".
+    title : title of the plot.
     look_at : probable cause of a failure.
     """
     is_force = name.endswith("force")
@@ -247,8 +260,8 @@ def _load(
     )
 
 
-# The root of a blade is on its pitch axis, at the hub's radius from the apex. Where a torque jumps,
-# the value is the one before it.
+# The root of a blade is the point on its pitch axis at the hub's radius from the apex. At a sample
+# at which a torque jumps, a load has the value before the jump.
 LOADS = (
     _load(
         "blade_root_force",
@@ -291,13 +304,13 @@ LOADS = (
 def named_loads(
     roots: Iterable[tuple[Array, Array]], shaft_force: Array, shaft_moment: Array, actuators: Array
 ) -> dict[str, Array]:
-    """Return the arrays of `LOADS` by name.
+    """Return the arrays of the quantities `LOADS` by name.
 
     Parameters
     ----------
     roots : for each blade the (n, 3) force (N) and moment (N m) at its root in its frame.
-    shaft_force, shaft_moment : (n, 3) N and N m, in the base frame.
-    actuators : (n, blades) N m.
+    shaft_force, shaft_moment : (n, 3) N and N m, force and moment of the bearing in the base frame.
+    actuators : (n, blades) N m, moments of the pitch actuators.
     """
     forces, moments = (np.stack(vectors, axis=1) for vectors in zip(*roots, strict=True))
     arrays = forces, moments, shaft_force, shaft_moment, actuators
@@ -312,14 +325,14 @@ _JOINT_GAP = QuantityMetric(
     with_reference=False,
     relative_to=longest_arm,
     check="gap",
-    bound=0.0,  # of a model without joints that can open
+    bound=0.0,  # for a method without a bound of its own: its joints must not open
     channel="joints",
     unit="of arm",
     fault="joint gap of {value} of the largest distance of a centre of mass from the hub centre",
     look_at="a joint of the chain that is not constrained, or its marker",
 )
 
-# Computed by the judgement of a run, not by its model.
+# Name of the quantity that the judgement of a run computes, not the model.
 DEFECT = "defect"
 
 BUILT_IN = (
@@ -410,12 +423,12 @@ NAMES = frozenset(quantity.name for quantity in BUILT_IN)
 
 
 def known_quantities(outputs: Iterable[str] = ()) -> tuple[Quantity, ...]:
-    """Return the built-in quantities, and those that installed packages add for `outputs`.
+    """Return all built-in quantities, and those of `outputs` that installed packages add.
 
     Raises
     ------
     InputError
-        If an output is neither.
+        If an output is neither built in nor added by an installed package.
     """
     return BUILT_IN + tuple(
         quantity for output in outputs if output not in _OUTPUTS for quantity in installed(output)
@@ -425,7 +438,7 @@ def known_quantities(outputs: Iterable[str] = ()) -> tuple[Quantity, ...]:
 def quantities(outputs: Iterable[str]) -> tuple[Quantity, ...]:
     """Return the quantities that a scene's `outputs` request.
 
-    Those that are stored whenever a model has them are included.
+    Quantities that are stored whenever a model computes them are included.
 
     Raises
     ------
@@ -454,7 +467,7 @@ def installed(output: str) -> tuple[Quantity, ...]:
     where = f"output {output!r}, from {points[0].value}"
     try:
         loaded = points[0].load()
-    except Exception as exc:  # whatever the other package raises
+    except Exception as exc:  # the other package may raise anything
         raise InputError(f"{where}: cannot be loaded: {type(exc).__name__}: {exc}") from exc
     brought = (loaded,) if isinstance(loaded, Quantity) else loaded
     if not isinstance(brought, Sequence) or not all(
@@ -491,13 +504,13 @@ def installed(output: str) -> tuple[Quantity, ...]:
 
 
 def array_of(quantity: Quantity, scene: Scene, samples: Trajectory) -> Array | None:
-    """Return a quantity of a run; None where there is none.
+    """Return the array of a quantity of a run; None if the run does not have it.
 
-    It is the model's own array, or what the quantity's producer computes from the samples.
+    The array is the model's, or else computed from the samples by the quantity's producer.
 
     Parameters
     ----------
-    quantity, scene : the declaration, and the scene of the run.
+    quantity, scene : the declaration of the quantity, and the scene of the run.
     samples : n samples of the run.
 
     Returns
@@ -527,7 +540,10 @@ def array_of(quantity: Quantity, scene: Scene, samples: Trajectory) -> Array | N
 
 
 def arrays(scene: Scene, samples: Trajectory) -> dict[str, Array]:
-    """Return the arrays that a scene requests and a run has, by name of the quantity."""
+    """Return the arrays of a run that its scene requests, by name of the quantity.
+
+    Quantities that the run does not have are left out.
+    """
     by_name = {
         quantity.name: array_of(quantity, scene, samples) for quantity in quantities(scene.outputs)
     }
@@ -535,12 +551,12 @@ def arrays(scene: Scene, samples: Trajectory) -> dict[str, Array]:
 
 
 def sizes(quantity: Quantity, values: Array) -> Array:
-    """Return the magnitudes of an array of a quantity.
+    """Return the magnitudes of the values of a quantity, or the lengths of its vectors.
 
     Parameters
     ----------
-    quantity : if its last dimension is `axis`, lengths of vectors are returned.
-    values : (n, ...) in its unit.
+    quantity : the declaration; its values are vectors if the last dimension is `axis`.
+    values : (n, ...) array in the unit of the quantity.
     """
     lengths: Array = (
         np.linalg.norm(values, axis=-1) if quantity.dimensions[-1] == "axis" else np.abs(values)
@@ -551,15 +567,16 @@ def sizes(quantity: Quantity, values: Array) -> Array:
 def deviation(
     quantity: Quantity, scene: Scene, run: Trajectory, reference: Trajectory | None
 ) -> Array | None:
-    """Return the size of a quantity, or of its difference from the reference: (common samples,).
+    """Return the magnitude at each sample of a quantity, or of its difference from the reference.
 
-    It is the largest over the other axes. None is returned where the quantity is not judged, or the
-    run or the reference that is needed does not have it.
+    The largest magnitude over the axes other than time is returned, (common samples,). None is
+    returned if the quantity is not judged, if the run does not have it, or if the reference is
+    needed and does not have it.
 
     Parameters
     ----------
-    quantity, scene : the declaration, and the scene of the run.
-    run, reference : samples; the reference is used if the rule of the quantity says so.
+    quantity, scene : the declaration of the quantity, and the scene of the run.
+    run, reference : samples. The reference is used if `QuantityMetric.with_reference` is true.
     """
     rule = quantity.judgement
     if rule is None:

@@ -1,7 +1,8 @@
-"""Define what a run returns and what is known of it: samples, engine's report, solution.
+"""Define the results of a run: its samples, the engine's report, and the solution.
 
-A model returns samples by quantity, the engine's report, and equations linearized about a steady
-state. A Python user has a `Solution`: scene, method, samples, status, numbers, times.
+A model returns a `Trajectory` with the samples of each quantity, an `Integration` with the engine's
+report, and, for modes, a `Linearization` of the equations. A `Solution` adds the scene, the method,
+the status, the metrics and the run times.
 """
 
 from __future__ import annotations
@@ -34,18 +35,17 @@ from rotor_mbs.solution.status import OK_ERROR, comparison
 
 
 class Trajectory:
-    """Hold the samples of a run at equally spaced times, up to its end: n rows, all finite.
+    """Hold the n samples of a run at equally spaced times, up to its end.
 
-    Angles and rates have the shape (n, 1 + blades), angles unwrapped. If they are read from a file
-    that does not have them, they are NaN. Other quantities are in `quantities` by name; built-in
-    ones are also attributes, None if the scene does not request them or the model does not compute
-    them.
+    Samples are finite, but angles and rates that a file does not have are NaN. Other quantities are
+    in `quantities` by name. A built-in quantity is also an attribute, which is None if the scene
+    does not request the quantity or the model does not compute it.
 
     Parameters
     ----------
     time : (n,) s.
-    angles, rates : (n, 1 + blades) rad and rad/s, rotor first.
-    quantities : (n, ...) arrays by name; None is left out.
+    angles, rates : (n, 1 + blades) rad and rad/s, rotor first; angles are unwrapped.
+    quantities : (n, ...) arrays by name. A name whose array is None is left out.
     """
 
     # No other attribute can be set: an array must be in `quantities` to be found.
@@ -58,7 +58,7 @@ class Trajectory:
         self.quantities = {
             name: values for name, values in quantities.items() if values is not None
         }
-        # Angles and rates at the integrator's own output points, where it has such.
+        # Angles and rates at the integrator's own output points; None if it has no such points.
         self.refined: Trajectory | None = None
 
     def get(self, name: str) -> Array | None:
@@ -67,9 +67,9 @@ class Trajectory:
         return arrays[name] if name in arrays else self.quantities.get(name)
 
     def replace(self, **changes: Array | None) -> Trajectory:
-        """Return a copy with other arrays, without `refined`; None removes an array.
+        """Return a trajectory in which some arrays are replaced, or removed by None.
 
-        Arrays are not copied.
+        The result has no `refined`. It shares the other arrays with this trajectory.
         """
         arrays: dict[str, Any] = {
             "time": self.time,
@@ -80,17 +80,18 @@ class Trajectory:
         return Trajectory(**{**arrays, **changes})
 
     def __getattr__(self, name: str) -> Any:
-        # Models and metrics read `run.work`, whichever package declared the quantity. The type is
-        # not `Array | None`, as an array that the scene requests is there.
+        # Built-in quantities are attributes, such as `run.work`. The type is not `Array | None`, so
+        # that callers need no assertion for an array that the scene requests.
         if name in NAMES:
             return self.quantities.get(name)
         raise AttributeError(f"a trajectory has no attribute {name!r}")
 
 
 def shape_fault(scene: Scene, run: Trajectory) -> str:
-    """Return what is wrong with the types and shapes of a run's arrays; "" where all are right.
+    """Return what is wrong with the type or shape of a run's array; "" if all arrays are right.
 
-    Each array must have real numbers, in the shape of the scene, with a row for each time.
+    Each array must consist of real numbers and have the shape that the scene requires, with a row
+    for each time.
     """
     for name in ("time", *(quantity.name for quantity in known_quantities(scene.outputs))):
         values = run.get(name)
@@ -114,14 +115,15 @@ def shape_fault(scene: Scene, run: Trajectory) -> str:
 class Integration:
     """Report how an engine ended an integration.
 
-    A reported success is not relied on; a reported failure is.
+    A run is judged by its samples if the engine reports success. If the engine reports a failure,
+    the run has failed.
 
     Attributes
     ----------
     success, message : whether the engine reports that it reached the end, and the reason if not.
-    time_reached : s.
-    steps, rhs_evaluations : number of steps, and of evaluations of the right-hand side; None if
-        unknown.
+    time_reached : time up to which the engine integrated, s.
+    steps, rhs_evaluations : number of steps, and number of evaluations of the right-hand side; None
+        if unknown.
     out_of_time : whether the integration was stopped by its time limit.
     """
 
@@ -134,7 +136,7 @@ class Integration:
 
 
 def report_fault(report: Integration) -> str:
-    """Return which field of a report has a wrong type, and what is allowed; "" where none."""
+    """Return which field of a report has a wrong type, and what is allowed; "" if none has."""
     kinds: dict[str, tuple[Any, str]] = {
         "success": (bool | np.bool_, "True or False"),
         "message": (str, "text"),
@@ -152,7 +154,7 @@ def report_fault(report: Integration) -> str:
 
 @dataclass
 class RunBlock:
-    """Hold several runs of scenes with equal numbers of blades and samples and equal outputs.
+    """Hold runs of several scenes that have equal numbers of blades and samples, and equal outputs.
 
     Attributes
     ----------
@@ -175,12 +177,12 @@ class RunBlock:
         )
 
     def end(self, i: int, integration: Integration, samples: int) -> None:
-        """End run i after a number of samples; later values are set to NaN.
+        """End run i after a number of samples: set the later values to NaN, and store the report.
 
         Parameters
         ----------
-        i : number of the run.
-        integration : its report; the time reached is set in it.
+        i : number of the run, from 0.
+        integration : report of the engine on the run; its `time_reached` is set here.
         samples : number of samples that are kept.
         """
         if samples < self.time.shape[1]:
@@ -191,14 +193,14 @@ class RunBlock:
 
 
 def all_coordinates(scene: Scene, angles: Array, rates: Array) -> tuple[Array, Array]:
-    """Return angles and rates of all coordinates from those that move: (n, 1 + blades).
+    """Return the angles and rates of all coordinates, each (n, 1 + blades).
 
-    A pitch that is fixed keeps its initial angle.
+    A pitch that does not move keeps its initial angle.
 
     Parameters
     ----------
-    scene : tells which coordinates move.
-    angles, rates : (n, m) rad and rad/s of its `moving_coordinates`.
+    scene : decides which coordinates move.
+    angles, rates : (n, m) rad and rad/s, of the scene's `moving_coordinates`.
     """
     moving = scene.moving_coordinates
     all_angles = np.tile(np.array(scene.initial_angles, dtype=angles.dtype), (len(angles), 1))
@@ -208,7 +210,7 @@ def all_coordinates(scene: Scene, angles: Array, rates: Array) -> tuple[Array, A
 
 
 def finite_rows(*tables: Array) -> int:
-    """Return the number of rows before the first that is not finite in one of the tables."""
+    """Return the number of rows before the first row that is not finite in one of the tables."""
     finite = np.all(
         [np.isfinite(table).all(axis=tuple(range(1, table.ndim))) for table in tables], axis=0
     )
@@ -216,12 +218,12 @@ def finite_rows(*tables: Array) -> int:
 
 
 def finite_samples(scene: Scene, arrays: Mapping[str, Array]) -> Trajectory:
-    """Return the samples up to the first in which one of the arrays is not finite.
+    """Return the samples before the first one at which one of the arrays is not finite.
 
     Parameters
     ----------
-    scene : gives the sample times.
-    arrays : (samples reached, ...) by name.
+    scene : decides the sample times.
+    arrays : (samples reached, ...) arrays by name.
     """
     n = finite_rows(*arrays.values())
     return Trajectory(
@@ -231,16 +233,18 @@ def finite_samples(scene: Scene, arrays: Mapping[str, Array]) -> Trajectory:
 
 @dataclass(frozen=True)
 class Linearization:
-    """Hold equations δq̈ + D δq̇ + K δq = 0 about a state of constant rates.
+    """Hold the linearized equations δq̈ + D δq̇ + K δq = 0 about a state of constant rates.
 
-    The mass matrix is divided out.
+    The equations of motion are multiplied by the inverse of the mass matrix M.
     """
 
-    # (n, n) 1/s²: M⁻¹ times the derivative of the forces by the coordinates, sign turned
+    # K, (n, n) 1/s²: minus M⁻¹ times the derivative of the forces with respect to the coordinates.
     stiffness: Array
-    damping: Array  # (n, n) 1/s: the same by the rates; it has gyroscopic terms, too
-    # (n,) rad/s²: accelerations that remain at the state, zero where it is steady; () where not
-    # known
+    # D, (n, n) 1/s: minus M⁻¹ times the derivative of the forces with respect to the rates. It
+    # includes gyroscopic terms.
+    damping: Array
+    # Accelerations at the state, (n,) rad/s², which are zero if the state is steady; empty if they
+    # are not known.
     residual: Array
 
 
@@ -249,10 +253,10 @@ def scene_at(scene: Scene, angles: Sequence[float] | Array, speed: float, torque
 
     Parameters
     ----------
-    scene : its outputs become the angles alone.
+    scene : the scene to be changed; only the angles are kept of its outputs.
     angles : (1 + blades,) rad, rotor first.
-    speed : rad/s, of the rotor; the pitches are at rest.
-    torque : N m.
+    speed : rotor rate, rad/s; the pitch rates are zero.
+    torque : torque on the rotor, N m.
     """
     return replace(
         scene,
@@ -268,12 +272,14 @@ def limit_at_zero(quotients: Sequence[Array], ratio: float) -> Array:
 
     Parameters
     ----------
-    quotients : the one with the smallest step first.
-    ratio : factor by which a doubled step enlarges each further term of the error, 2 for one-sided
-        quotients, 4 for central ones.
+    quotients : difference quotients, the one with the smallest step first.
+    ratio : factor by which the first term of the error grows if the step is doubled, and by which
+        each further term grows more than the term before it: 2 for one-sided quotients, 4 for
+        central ones.
     """
     values = list(quotients)
-    # Each pass cancels the leading term of the error between neighbours, and leaves one value less.
+    # Each pass combines neighbours so that the leading term of their errors cancels. One value less
+    # is left.
     for power in range(1, len(values)):
         values = [
             fine + (fine - coarse) / (ratio**power - 1.0)
@@ -286,8 +292,8 @@ def limit_at_zero(quotients: Sequence[Array], ratio: float) -> Array:
 class Solution:
     """Hold the result of a method applied to a scene.
 
-    Quantities are attributes and items: `solution.tip`, `solution["tip"]`; (n, ...) arrays, n
-    samples.
+    A quantity is an (n, ...) array with a row for each of the n samples. It is an attribute and an
+    item: `solution.tip`, `solution["tip"]`.
 
     Attributes
     ----------
@@ -295,8 +301,8 @@ class Solution:
     trajectory : the samples.
     integration : report of the engine.
     settings : all settings of the method.
-    setup_time_s, run_times_s, output_time_s : times (s) to build the model, for each integration,
-        and to compute the samples; no run times if they are unknown.
+    setup_time_s, output_time_s : times (s) to build the model and to compute the samples.
+    run_times_s : time (s) of each integration; empty if the times are unknown.
     status, message : status determined from the samples, and its reason; "" if not assessed.
     metrics : numbers by their names in a results file, such as energy_drift_max.
     """
@@ -320,17 +326,17 @@ class Solution:
 
     @property
     def angles(self) -> Array:
-        """Return the angles of the rotor, then the pitch of each blade: (n, 1 + blades) rad.
+        """Return the rotor angle, then the pitch angle of each blade: (n, 1 + blades) rad.
 
-        NaN if they are not stored.
+        Angles that are not stored are NaN.
         """
         return self.trajectory.angles
 
     @property
     def rates(self) -> Array:
-        """Return the rates of the rotor, then the pitch of each blade: (n, 1 + blades) rad/s.
+        """Return the rotor rate, then the pitch rate of each blade: (n, 1 + blades) rad/s.
 
-        NaN if they are not stored.
+        Rates that are not stored are NaN.
         """
         return self.trajectory.rates
 
@@ -349,9 +355,9 @@ class Solution:
         return known[name]
 
     def __getattr__(self, name: str) -> Array:
-        # Called for names that are no field: quantities of plug-ins are attributes like the
-        # built-in ones. Names that start with "_" stay unknown, as copying and pickling ask for
-        # those of an object that is not yet filled.
+        # Python calls this for a name that is no field. Built-in quantities and those of other
+        # packages are such names. A name that starts with "_" is refused, because copying and
+        # pickling ask for such names before the object has its fields.
         if not name.startswith("_") and "trajectory" in self.__dict__:
             try:
                 return self[name]
@@ -364,7 +370,7 @@ class Solution:
 
         For example `data.angles.sel(coordinate="pitch 1")`, `data.tip.sel(blade=1, axis="y")`.
         """
-        import xarray  # late: 0.4 s
+        import xarray  # imported only here, because the import takes 0.4 s
 
         labels = {"coordinate": list(self.scene.coordinate_labels), "axis": ["x", "y", "z"]}
         scales: dict[str, Any] = {**scale_values(self.scene), "time": self.time}
@@ -392,7 +398,7 @@ class Solution:
         return xarray.Dataset(variables, coordinates, {**facts, **self.metrics})
 
     def _summary(self) -> dict[str, str]:
-        """Return the facts that a run prints, by name: method, status and largest values."""
+        """Return the texts that a run prints, by name: method, status and largest values."""
         last = float(self.time[-1]) if len(self.time) else self.integration.time_reached
         reached = f"{last:g} s of {self.scene.duration:g} s, {len(self.time)} samples"
         shown = comparison(self.metrics, self.scene.duration)
@@ -412,7 +418,7 @@ class Solution:
         return {name: text for name, text in rows.items() if text}
 
     def _arrays(self) -> str:
-        """Return a text such as "time (1001,) s, angles (1001, 4) rad": the arrays that it has."""
+        """Return the names, shapes and units of the arrays: "time (9,) s, angles (9, 4) rad"."""
         units = {quantity.name: quantity.units for quantity in quantities(self.scene.outputs)}
         shown = [f"time {self.time.shape} s"]
         for name, values in self.quantities.items():
