@@ -1,13 +1,18 @@
 """Judge a run by its samples, with the checks and bounds of `rotor-mbs check`.
 
-A run is ok if it reaches the end of the scene and all that it stores is right. Its times and
-initial state are the scene's. Its tips and energies are those of its angles and rates, its loads
-those of the closed form at its states. Every interval's defect is within the method's bound, and
-the energy balance is kept. The error of the angles up to the horizon, from the reference or
-predicted from the defects, is at most 0.01 rad.
+A run is ok if it reaches the end of the scene and passes these checks:
 
-An engine's report can only lower a status. Runs of the printed equations that reach the end are
-"completed": nothing is claimed of them.
+- Sample times and initial state equal those of the scene.
+- Tips and energies agree with the angles and rates of the run.
+- Loads agree with those of the closed form at the states of the run.
+- The defect of every interval is within the method's bound.
+- The energy balance is kept.
+- The angle error up to the horizon is at most 0.01 rad. It is computed from the reference, or else
+  predicted from the defects.
+
+An engine that reports a failure makes a status worse; one that reports success never makes it
+better. Runs of the printed equations that reach the end are "completed": their accuracy is not
+judged.
 """
 
 from __future__ import annotations
@@ -43,27 +48,29 @@ from rotor_mbs.solution.trajectory import Integration, Solution, Trajectory
 # A run that has none of these metrics cannot be judged.
 _CHECKS = ("energy_drift_max", "defect_max", "angle_error_max")
 
-# If an engine reports success of an inaccurate run, this is not called false as long as the run
-# resembles the motion: its energy drift (relative to the energy scale), its defects (rad) and the
-# errors of its quantities (relative to their scales) are at most the first of these numbers, and
-# its angle error up to the horizon (rad) is at most the second.
+# An engine may report success of a run that is inaccurate. The report is called false only if the
+# run does not resemble the motion, that is, if one of these limits is exceeded. The first limit is
+# for the energy drift (relative to the energy scale), the largest defect (rad) and the errors of
+# quantities (relative to their scales). The second one is for the angle error up to the horizon
+# (rad).
 _RESEMBLES = 1e-2
 _RESEMBLING_ANGLE = 1.0
 
-# An initial state is certainly not singular if its share of the rotor's inertia is larger than
-# this, see `smallest_rotor_inertia_share`.
+# An initial state is certainly not singular if its share of the rotor's inertia is larger than this
+# number, see `smallest_rotor_inertia_share`.
 _CLEAR_SHARE = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
 class Judgement:
-    """Hold the outcome of a run.
+    """Hold the judgement of a run: its status with the reason, and the numbers behind it.
 
     Attributes
     ----------
-    status, message : one of `status.STATUSES`, and the reason in a line; "" for ok.
-    advice : what to do about it, where that is known; else "".
-    false_success : whether the engine reported success of a run that is wrong.
+    status : one of `status.STATUSES`.
+    message : reason of the status in one line; "" for ok.
+    advice : what a user can do about the failure; "" if nothing is known.
+    false_success : whether the engine reported success of a run that does not resemble the motion.
     metrics, defects : see `metrics_of` and `defects_of`.
     """
 
@@ -76,9 +83,10 @@ class Judgement:
 
 
 def defects_of(scene: Scene, run: Trajectory) -> Defects | None:
-    """Return the defects of a run's intervals.
+    """Return the interval defects of a run.
 
-    None is returned without angles and rates, or with fewer than two samples.
+    None is returned if the scene does not request both angles and rates, or if the run has fewer
+    than two samples.
     """
     if len(run.time) < 2 or not (scene.wants("angles") and scene.wants("rates")):
         return None
@@ -86,21 +94,21 @@ def defects_of(scene: Scene, run: Trajectory) -> Defects | None:
 
 
 def bounds_of(method: str) -> Bounds:
-    """Return the bounds by which runs of a method are judged: its own precede the shipped ones."""
+    """Return the bounds for runs of a method: its own bounds, then the shipped ones."""
     known = find_method_or_none(method)
     return shipped_bounds().with_entries(known.bounds if known else ())
 
 
-# A run that diverges overflows: numbers that are not finite are judged, too.
+# Numbers of a run that diverges may overflow. They are judged, too, so that no warning is needed.
 @np.errstate(over="ignore", invalid="ignore", divide="ignore")
 def judge(scene: Scene, run: Solution, reference: Trajectory | None) -> Judgement:
-    """Return the status of a run, its numbers, and whether its report of success is false.
+    """Judge a run: return its status, its metrics, and whether its report of success is false.
 
     Parameters
     ----------
-    scene : the scene.
-    run : its method, its samples and its engine's report are used, not its status and metrics.
-    reference : of the scene; without one errors are predicted from the defects.
+    scene : the scene of the run.
+    run : the method, the samples and the engine's report are used; status and metrics are ignored.
+    reference : samples of the scene's reference; if None, errors are predicted from the defects.
     """
     bounds = bounds_of(run.method)
     defects = defects_of(scene, run.trajectory)
@@ -126,16 +134,16 @@ def clearly_ok(
 ) -> NDArray[np.bool_]:
     """Return whether each of k runs of a method is certain to be ok, (k,).
 
-    A few numbers of each run suffice to know that `judge` would call it ok without a reference. A
-    run that is not clearly ok may be ok all the same.
+    The result is true if a few numbers of the run show that `judge` would return ok without a
+    reference. If it is false, the run may still be ok, and `judge` decides.
 
     Parameters
     ----------
     scenes, method : the scene of each run, and the name of the method.
-    integrations, samples : of each run its engine's report and its number of finite samples.
-    metrics : of each run its energy_drift_max, and those of its defects where they were computed.
-    angles : (k,) rad, the largest of each run.
-    own : bounds of the method.
+    integrations, samples : the engine's report and the number of finite samples of each run.
+    metrics : energy_drift_max of each run, and the metrics of its defects if they were computed.
+    angles : (k,) rad, largest magnitude of an angle of each run.
+    own : bounds that the method brings itself.
     """
     bounds = shipped_bounds().with_entries(own)
     energy, defect = bounds.of("energy", method).value, defect_bound(bounds, method)
@@ -158,15 +166,15 @@ def clearly_ok(
 
 
 def _is_close(scene: Scene, status: str, metrics: Metrics) -> bool:
-    """Return whether an engine's claim of success may stand.
+    """Return whether an engine's report of success is accepted, not called false.
 
-    The claim stands for an inaccurate run if it resembles the motion. It also stands for an
-    unchecked run, as no number contradicts it.
+    It is accepted for an inaccurate run that still resembles the motion. It is also accepted for an
+    unchecked run, because no number contradicts it.
 
     Parameters
     ----------
-    scene : its outputs and scales decide which errors of quantities there are, and their size.
-    status, metrics : of the run.
+    scene : the scene; it decides which quantities have errors, and the scales of these errors.
+    status, metrics : status and metrics of the run.
     """
     if status != "inaccurate":
         return status in ("ok", "unchecked", "completed")
@@ -183,9 +191,9 @@ def _is_close(scene: Scene, status: str, metrics: Metrics) -> bool:
 
 
 def largest_angle_error(metrics: Metrics) -> float:
-    """Return the angle error (rad) up to the horizon; 0 where it is not known.
+    """Return the largest angle error (rad) up to the horizon; 0 if it is not known.
 
-    It is that from the reference, or else the predicted one.
+    The error is computed from the reference, or else predicted from the defects.
     """
     return metrics.get("angle_error_max", metrics.get("angle_error_predicted", 0.0))
 
@@ -195,16 +203,22 @@ def _status(
 ) -> tuple[str, str, str]:
     """Return status, message and advice of a run.
 
-    The first of these that holds gives the status: the run did not reach the end; it is one of the
-    printed equations; the scene has no solution up to its end; a check fails; the run could be
-    judged only in part.
+    The first of these conditions that holds decides the status:
+
+    - The run did not reach the end, or its engine reports a failure.
+    - The run is one of the printed equations.
+    - The scene has no solution up to its end.
+    - A check fails.
+    - The run could be judged only in part.
+
+    If none holds, the run is ok.
 
     Parameters
     ----------
-    run : samples, metrics and defects.
+    run : samples, metrics and defects of the run.
     integration : the engine's report.
-    reference : of the scene; None without one.
-    bounds : by which the checks are judged.
+    reference : samples of the scene's reference; None if it has none.
+    bounds : bounds of the checks.
     """
     scene, trajectory, metrics = run.scene, run.trajectory, run.metrics
     # Runs that did not reach the end, or whose engine reports a failure.
@@ -236,8 +250,8 @@ def _status(
     if not is_corrected(run.method):
         return "completed", "", ""
 
-    # Complete runs of scenes without a solution: from a singular state, or past the time where the
-    # solution ends.
+    # Complete runs of scenes that have no solution up to their end. The initial state is singular,
+    # or the run continued beyond the time at which the solution ends.
     if rotor_inertia_shares(scene, trajectory.angles[:1])[0] < NO_INERTIA:
         return "singular", "with all pitches at ±π/2 the initial mass matrix is singular", ""
     if (
@@ -252,7 +266,7 @@ def _status(
             "",
         )
 
-    # The same checks as those of `check`; the first one that fails gives the reason.
+    # The checks are those of the command `check`. The first one that fails gives the message.
     for check in run_checks(run, bounds):
         if not check.passed:
             lost = check.name == "error" and symmetry_loss(run) is not None
@@ -277,12 +291,13 @@ def _status(
 
 
 def _too_far_apart(defects: Defects, count: int) -> str:
-    """Return why a defect of more than 0.01 rad would not be seen in some intervals.
+    """Return the message that some intervals are too long to be judged.
 
     Parameters
     ----------
-    defects : of the run; the interval with the largest error growth is named.
-    count : number of these intervals.
+    defects : interval defects of the run. The message has the length and the error growth of the
+        interval with the largest growth among those that are not judged.
+    count : number of intervals that are not judged.
     """
     unseen = np.where(defects.is_judged, 0.0, defects.growth)
     worst = int(unseen.argmax())
@@ -297,18 +312,19 @@ def _too_far_apart(defects: Defects, count: int) -> str:
 def smallest_rotor_inertia_share(scene: Scene, run: Trajectory) -> float:
     """Return the smallest share of the rotor's inertia near the last sample of a run.
 
-    The share is the rotor's inertia with every pitch free to give way, divided by that with fixed
-    pitches, see `models.lagrange.singularity`. The smallest share on the straight line from the
-    last sample to the next one is returned.
+    The share is the rotor's inertia with all pitches free to move, divided by its inertia with
+    fixed pitches, see `models.lagrange.singularity`. From the last sample the angles are continued
+    at constant rates over one interval; the smallest share on this path is returned.
 
     Parameters
     ----------
-    scene, run : a run without samples is at the initial angles of the scene.
+    scene, run : the scene and the samples of the run. Without samples, the share at the scene's
+        initial angles is returned.
     """
     if not len(run.time):
         angles = np.array([scene.initial_angles])
     else:
-        # A singularity may lie between the last sample and the one that was not reached.
+        # A singularity may lie between the last sample and the next one, which was not reached.
         step = scene.duration / (scene.samples - 1)
         angles = run.angles[-1] + np.linspace(0.0, step, 65)[:, None] * run.rates[-1]
     return float(rotor_inertia_shares(scene, angles).min())

@@ -1,8 +1,9 @@
-"""The checks of a run's samples, in one table: its status, `check` and `test-method` read the same.
+"""Check the samples of a run: compare numbers with bounds.
 
-Each check is a number against a bound. What samples say of each other (times, start, tips,
-energies) is asked of every run; defects, balances, loads and exact solutions only of a run that
-claims the corrected equations.
+The status of a run and the commands `check` and `test-method` use the same checks. Times, initial
+state, tips and energies are checked for every run. Defects, energy balance, quantities such as
+loads, angle errors and exact solutions are checked only for a run that claims the corrected
+equations.
 """
 
 from __future__ import annotations
@@ -34,24 +35,26 @@ from rotor_mbs.solution.quantities import (
 from rotor_mbs.solution.status import OK_ERROR
 from rotor_mbs.solution.trajectory import Trajectory
 
-# Below this share of the rotor's inertia the last bit of a pitch decides its value: a hundred times
-# the square of the 1e-16 to which π/2 is known.
+# The share of the rotor's inertia is its inertia with all pitches free to move, divided by that
+# with fixed pitches, see `models.lagrange.singularity`. A share below NO_INERTIA counts as zero,
+# because the last bit of a pitch decides its value: a double is within 1e-16 of π/2, and the limit
+# is a hundred times the square of this distance.
 NO_INERTIA = 1e-30
-# Share of the rotor's inertia that is left once every pitch is free: if it is below this where a
-# run broke off, the singularity is the reason.
+# If the share is below this limit where a run broke off, the singularity is the reason.
 SINGULAR_SHARE = 1e-3
-# Round-off of a run's state after some hundred steps; magnified it may add to the energy error.
+# Relative round-off of a run's state after some hundred steps. Near a singularity it is magnified
+# and adds to the energy error.
 _ROUND_OFF = 1e-14
-# Ten units in the last place of an angle that starts turns away from zero are no error of the
-# method.
+# Ten units in the last place, relative. An error of this size, in an angle that starts turns away
+# from zero, is not an error of the method.
 _START_ROUND_OFF = 10.0 * float(np.finfo(float).eps)
-# About the number of intervals of a run: an error that is more than this many times the largest
-# defect is not only their sum, but has been amplified.
+# About the number of intervals of a run. An angle error that is more than this many times the
+# largest defect cannot be the mere sum of the defects: the motion has amplified them.
 _GROWN = 1e4
 
 
 class Where(NamedTuple):
-    """Locate a check by scene, method and channel; the method is "*" for a whole scene."""
+    """Locate a check by scene, method and channel; the method "*" stands for the whole scene."""
 
     scene: str
     method: str
@@ -60,14 +63,16 @@ class Where(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """Hold a number and its bound.
+    """Hold a check: a number that is compared with a bound.
 
     Attributes
     ----------
-    name, where : of the check.
-    value, bound : both in `unit`; NaN fails.
+    name : name of the check, such as "defect".
+    where : scene, method and channel that are checked.
+    value, bound : number and largest number that passes, both in `unit`. A value of NaN fails.
     hint : probable cause of a failure.
-    fault : what a failure is called in a run's message; "" if its name, value and bound say it.
+    unit : unit of value and bound.
+    fault : message of a run that fails the check; "" if it is made from name, value and bound.
     """
 
     name: str
@@ -80,32 +85,32 @@ class Check:
 
     @property
     def passed(self) -> bool:
-        """Return whether the value is at most the bound; NaN is not."""
+        """Return whether the value is at most the bound; False for NaN."""
         return self.value <= self.bound  # False for NaN
 
     @property
     def margin(self) -> float:
-        """Return how many times the value fits into the bound; infinite for a value of zero."""
+        """Return the bound divided by the value: infinite for a value of 0, and 0 for NaN."""
         if math.isnan(self.value):
             return 0.0
         return self.bound / self.value if self.value else math.inf
 
     @property
     def message(self) -> str:
-        """Return the reason of a status, in a line."""
+        """Return the message, in one line, of a run that fails the check."""
         what = f"{self.name}, {self.where.channel}: {self.value:.1e} {self.unit}".rstrip()
         return self.fault or f"{what}, allowed {self.bound:.0e}; {self.hint}"
 
 
 @dataclass(frozen=True)
 class RunSamples:
-    """Hold the samples of a run, and what follows from them.
+    """Hold the samples of a run, with the metrics and the defects that follow from them.
 
     Attributes
     ----------
-    scene, method, trajectory : the run.
-    metrics : those of `metrics_of`.
-    defects : None without angles and rates, or with fewer than two samples.
+    scene, method, trajectory : scene, name of the method, and samples of the run.
+    metrics : result of `metrics_of`.
+    defects : interval defects; None without angles and rates, or with fewer than two samples.
     """
 
     scene: Scene
@@ -115,19 +120,19 @@ class RunSamples:
     defects: Defects | None
 
     def where(self, channel: str) -> Where:
-        """Return the place of a check of one of its channels."""
+        """Return the scene and the method of this run with a channel, to locate a check."""
         return Where(self.scene.name, self.method, channel)
 
 
 def bounded(
     bounds: Bounds, name: str, where: Where, value: float, unit: str, hint: str, fault: str = ""
 ) -> Check:
-    """Return a value against the bound of the check `name` for the method.
+    """Return a check whose bound is looked up by its name and its method.
 
     Parameters
     ----------
-    bounds : bounds of the scene.
-    name, where, value, unit, hint, fault : as the fields of the check.
+    bounds : bounds of the scene, in which the bound is looked up.
+    name, where, value, unit, hint, fault : fields of the check.
     """
     return Check(name, where, float(value), bounds.of(name, where.method).value, hint, unit, fault)
 
@@ -135,14 +140,14 @@ def bounded(
 def run_checks(run: RunSamples, bounds: Bounds, *, is_corrected: bool = True) -> Iterator[Check]:
     """Yield every check of a run that has samples.
 
-    The first check that fails names the reason of a status, so the order matters: where a motion is
-    wrong, so is much of what follows from it.
+    The first check that fails gives the message of the run, so that the order matters. The motion
+    is checked before the outputs, because a wrong motion may be the cause of wrong outputs.
 
     Parameters
     ----------
-    run : the samples of the run, at least one.
+    run : the run, with at least one sample.
     bounds : bounds of the scene.
-    is_corrected : whether the run claims the corrected equations; the motion of others is not
+    is_corrected : whether the run claims the corrected equations. If not, its motion is not
         checked.
     """
     yield from _checks_of_rows(run, bounds)
@@ -152,7 +157,7 @@ def run_checks(run: RunSamples, bounds: Bounds, *, is_corrected: bool = True) ->
 
 
 def _checks_of_rows(run: RunSamples, bounds: Bounds) -> Iterator[Check]:
-    """Yield the checks of sample times and initial state, which are the scene's.
+    """Yield the checks that sample times and initial state equal those of the scene.
 
     Parameters
     ----------
@@ -171,7 +176,7 @@ def _checks_of_rows(run: RunSamples, bounds: Bounds) -> Iterator[Check]:
     )
     if not scene.wants("angles"):
         return
-    # A pitch without inertia is fixed: its rate is zero, whatever the scene says.
+    # A pitch without inertia is fixed: its rate is zero, whatever initial rate the scene has.
     free = [True, *(blade.has_pitch_inertia for blade in scene.blades)]
     rates = np.where(free, scene.initial_rates, 0.0)
     off = float(np.abs(trajectory.angles[0] - scene.initial_angles).max())
@@ -184,9 +189,10 @@ def _checks_of_rows(run: RunSamples, bounds: Bounds) -> Iterator[Check]:
 
 
 def _checks_of_outputs(run: RunSamples, bounds: Bounds) -> Iterator[Check]:
-    """Yield the checks of tips and energies against those of rigid bodies.
+    """Yield the checks of stored tips and energies.
 
-    The bodies are at the run's own angles and rates.
+    They are compared with the tips and energies of rigid bodies at the run's own angles and rates.
+    The stored energy error is compared with that of the stored energies.
 
     Parameters
     ----------
@@ -220,22 +226,23 @@ def _checks_of_outputs(run: RunSamples, bounds: Bounds) -> Iterator[Check]:
 
 
 def _with_fault(check: Check, fault: str, scale: float = 1.0) -> Check:
-    """Return the check with a fault whose field {bound} is filled in.
+    """Return the check with a message for its failure, in which the bound is filled in.
 
     Parameters
     ----------
-    check, fault : the check, and its message.
-    scale : by which the bound is multiplied in the message, to have its unit.
+    check : the check.
+    fault : the message, with a field {bound}.
+    scale : factor that converts the bound into the unit of the message.
     """
     return replace(check, fault=fault.format(bound=f"{check.bound * scale:.0e}"))
 
 
 def _checks_of_energies(run: RunSamples, bounds: Bounds) -> Iterator[Check]:
-    """Yield the checks of stored energies against those of the bodies at the run's states.
+    """Yield the checks of stored energies and work against those computed from angles and rates.
 
     Parameters
     ----------
-    run, bounds : see `run_checks`; the run has rates and energies.
+    run, bounds : see `run_checks`; the run has angles, rates and energies.
     """
     scene, trajectory = run.scene, run.trajectory
     angles, work = trajectory.angles, trajectory.work
@@ -254,16 +261,16 @@ def _checks_of_energies(run: RunSamples, bounds: Bounds) -> Iterator[Check]:
             off = float(np.abs(stored - own).max()) / scale
             check = bounded(bounds, "energies", run.where(name), off, "of scale", hint)
             if name == "work" and not is_built_in(run.method):
-                # Work that is integrated with the motion is no function of the state alone: it is
-                # only as accurate as the balance of energy.
+                # A method of another package may integrate the work with the motion. Then the work
+                # is only as accurate as the energy balance.
                 check = replace(check, bound=max(check.bound, energy_allowed(run, bounds)))
             yield check
 
 
 def _checks_of_motion(run: RunSamples, bounds: Bounds) -> Iterator[Check]:
-    """Yield the checks of the motion: energy balance, loads, defects, error, exact motion.
+    """Yield the checks of the motion: energy, quantities, defects, angle error, exact solution.
 
-    Only a run that claims the corrected equations has to pass them.
+    Only a run that claims the corrected equations has to pass these checks.
 
     Parameters
     ----------
@@ -296,8 +303,8 @@ def _checks_of_motion(run: RunSamples, bounds: Bounds) -> Iterator[Check]:
         fault = _error_fault(run, metrics["angle_error_max"], "angle error")
         yield _with_fault(bounded(bounds, "error", run.where("angles"), error, "rad", hint), fault)
     elif "angle_error_predicted" in metrics:
-        # Without a reference the error is predicted from the defects; bounds of shipped scenes do
-        # not apply to it, as they are for the true error.
+        # Without a reference the error is predicted from the defects. The bounds of shipped scenes
+        # are for the error from the reference, so that they do not apply to a predicted error.
         error, where = metrics["angle_error_predicted"], run.where("angles, predicted")
         value, fault = (
             max(error - start_slack(scene), 0.0),
@@ -316,9 +323,9 @@ def _checks_of_motion(run: RunSamples, bounds: Bounds) -> Iterator[Check]:
 
 
 def _checks_of_defects(run: RunSamples, bounds: Bounds) -> Iterator[Check]:
-    """Yield the checks of the median and the largest of the defects.
+    """Yield the checks of the median of the defects, and of the defect furthest beyond its bound.
 
-    A bound on the largest that is above 0.01 rad counts as 0.01 rad.
+    The second check is made with a bound of at most 0.01 rad.
 
     Parameters
     ----------
@@ -351,12 +358,12 @@ def _checks_of_defects(run: RunSamples, bounds: Bounds) -> Iterator[Check]:
 
 
 def _error_fault(run: RunSamples, error: float, what: str) -> str:
-    """Return the message for an angle error that is too large, with the probable cause.
+    """Return the message for an angle error that is too large, with its probable cause.
 
     Parameters
     ----------
     run : see `run_checks`.
-    error : rad.
+    error : angle error, rad.
     what : name of the error in the message.
     """
     metrics, scene = run.metrics, run.scene
@@ -377,13 +384,13 @@ def _error_fault(run: RunSamples, error: float, what: str) -> str:
 
 
 def symmetry_loss(run: RunSamples) -> tuple[int, float] | None:
-    """Return the first pitch that leaves zero although symmetry keeps it there, and when.
+    """Return the first pitch that leaves zero although symmetry keeps it there, and the time.
 
-    None is returned where there is no such pitch before the horizon.
+    None is returned if no pitch leaves zero up to the horizon.
 
     Parameters
     ----------
-    run : its defects say which pitches rest at zero by symmetry.
+    run : see `run_checks`. Its defects say which pitches rest at zero by symmetry.
 
     Returns
     -------
@@ -403,28 +410,28 @@ def symmetry_loss(run: RunSamples) -> tuple[int, float] | None:
 
 
 def defect_bound(bounds: Bounds, method: str) -> float:
-    """Return the bound on defects of a method, rad: at most 0.01."""
+    """Return the bound for defects of a method in intervals of 0.01 s, at most 0.01 rad."""
     return min(bounds.of("defect", method).value, OK_ERROR)
 
 
 def defect_allowed(metrics: Metrics, bound: float) -> float:
-    """Return the defect beyond rounding (rad) that is allowed in the worst interval.
+    """Return the largest defect beyond rounding (rad) that is allowed in the worst interval.
 
     Parameters
     ----------
-    metrics : have the defect_judged and defect_excess of that interval.
-    bound : rad, of the method for 0.01 s.
+    metrics : metrics of the run; defect_judged and defect_excess are those of the worst interval.
+    bound : bound of the method for an interval of 0.01 s, rad.
     """
     judged, excess = metrics.get("defect_judged", 0.0), metrics.get("defect_excess", 0.0)
     return bound * (excess / judged) if 0.0 < judged < math.inf else bound
 
 
 def energy_allowed(run: RunSamples, bounds: Bounds) -> float:
-    """Return the error of the energy balance that is allowed, a share of the energy scale.
+    """Return the largest energy drift that is allowed, as a share of the energy scale.
 
-    What a method may do to the energy in 0.01 s adds up over the run, as defects do, and more of
-    it is allowed in an interval that is longer or in which errors grow: the bound is multiplied by
-    the mean of the intervals' factors for defects, but is at most 0.01.
+    As for defects, more is allowed if the intervals are longer than 0.01 s or if errors grow over
+    them. The method's bound is multiplied by the mean of the intervals' `bound_factors`. The
+    product is at most 0.01, unless the bound itself is larger.
 
     Parameters
     ----------
@@ -438,12 +445,12 @@ def energy_allowed(run: RunSamples, bounds: Bounds) -> float:
 
 
 def quantity_bound(rule: QuantityMetric, bounds: Bounds, method: str) -> float | None:
-    """Return the largest value of a quantity that passes; None where it is not checked.
+    """Return the bound of a quantity's metric; None if the metric is not checked.
 
     Parameters
     ----------
-    rule : names a check, or has a bound of its own.
-    bounds, method : where the bound of that check is looked up.
+    rule : rule of the quantity, which names a check or has a bound of its own.
+    bounds, method : bounds and name of the method, to look up the bound of that check.
     """
     entry = bounds.find(rule.check, method) if rule.check else None
     return entry.value if entry else rule.bound
@@ -456,8 +463,8 @@ def quantity_errors(
 
     Parameters
     ----------
-    scene : its outputs decide which quantities there are.
-    metrics : of the run; quantities without a value in it are left out.
+    scene : the scene of the run. Its outputs decide which quantities there are.
+    metrics : metrics of the run. A quantity whose metric is missing is left out.
     """
     for quantity in known_quantities(scene.outputs):
         rule = quantity.judgement
@@ -472,8 +479,8 @@ def quantity_errors(
 def _checks_of_quantities(run: RunSamples, bounds: Bounds) -> Iterator[Check]:
     """Yield the checks of quantities that have a rule and a bound.
 
-    These are gaps of joints, loads, and quantities of plug-ins. What rounding may cause is
-    subtracted from the errors of loads.
+    Such quantities are gaps of joints, loads, and quantities of other packages. The error that
+    rounding may cause is subtracted from the errors of loads.
 
     Parameters
     ----------
@@ -494,7 +501,7 @@ def _checks_of_quantities(run: RunSamples, bounds: Bounds) -> Iterator[Check]:
             assert exact is not None
             off = sizes(quantity, stored - exact) - sizes(quantity, rounding[quantity.name])
             error = max(float(off.max(initial=0.0)), 0.0) / rule.scale_of(scene, trajectory)
-            # also NaN; minus infinity: rounding leaves everything open
+            # NaN and infinity fail. Minus infinity passes: rounding may cause any error there.
             if not (off < math.inf).all():
                 error = math.inf
         where = run.where(rule.channel or quantity.name)
@@ -505,10 +512,10 @@ def _checks_of_quantities(run: RunSamples, bounds: Bounds) -> Iterator[Check]:
 
 
 def _load_floors(run: RunSamples, bounds: Bounds) -> dict[str, Array]:
-    """Return the error of each load that rounding can cause, by name.
+    """Return the errors of the loads that rounding can cause, as arrays by name of the load.
 
-    It is that of rounding the state and, unless the method has a bound of its own, that of any
-    engine's arithmetic.
+    An error includes that of rounding the state. If the method has no bound of its own for loads,
+    it also includes the rounding errors in the arithmetic of any engine.
     """
     samples = run.trajectory.time, run.trajectory.angles, run.trajectory.rates
     floors = load_rounding(run.scene, *samples)
@@ -519,9 +526,9 @@ def _load_floors(run: RunSamples, bounds: Bounds) -> dict[str, Array]:
 
 
 def start_slack(scene: Scene) -> float:
-    """Return the error (rad) due to rounding of an initial angle that is turns away from zero.
+    """Return the largest angle error (rad) due to rounding of large initial angles.
 
-    It is 0 within a turn.
+    It is 0 if all initial angles are within one turn of zero.
     """
     return _START_ROUND_OFF * max(
         0.0, *(abs(angle) - 2.0 * np.pi for angle in scene.initial_angles)
@@ -529,14 +536,15 @@ def start_slack(scene: Scene) -> float:
 
 
 def energy_slack(scene: Scene, run: Trajectory) -> float:
-    """Return the share of the energy scale that magnified round-off may add to an energy error."""
+    """Return the share of the energy scale that magnified round-off may add to the energy drift."""
     return _ROUND_OFF * (energy_conditioning(scene, run) - 1.0) + start_slack(scene)
 
 
 def energy_conditioning(scene: Scene, run: Trajectory) -> float:
     """Return the factor, at least 1, by which the energy magnifies round-off of the state.
 
-    Near a pitch of π/2 its terms are 1/√share larger than it.
+    Where all pitches are near ±π/2, the terms of the kinetic energy are larger than their sum by a
+    factor of about 1/√share, with the share of the rotor's inertia that remains.
     """
     smallest = max(float(least_inertia_shares(scene, run.angles).min()), NO_INERTIA)
     return max(1.0, float(np.sqrt(SINGULAR_SHARE / smallest)))
