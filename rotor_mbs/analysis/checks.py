@@ -1,7 +1,8 @@
-"""Checks of a results file, as `rotor-mbs check` reports them: numbers against bounds.
+"""Check a results file, as `rotor-mbs check` does: compare numbers with bounds.
 
-Each check has a hint to the cause where it fails. Every number is computed again from the stored
-samples; a stored metric or status is checked, never used.
+Each check has a hint to the cause of a failure. The numbers of a run are computed again from its
+stored samples, and its stored metrics and status are compared with them. Only the check "published"
+compares stored metrics with the paper's numbers.
 """
 
 from __future__ import annotations
@@ -48,22 +49,25 @@ from rotor_mbs.solution.metrics import (
 from rotor_mbs.solution.status import COMPLETE
 from rotor_mbs.solution.trajectory import Solution, Trajectory
 
-# Extremes are taken at ode45's own points, which differ when it starts in between: they agree
-# within its relative tolerance, of rad or rad/s.
+# Allowed difference of an extreme at ode45's own output points from the stored one, relative, or
+# rad and rad/s below 1. ode45 has other output points if it is started again from a sample.
 _READ_OFF = 1e-3
-_MOST_INTERVALS = 12  # in which a peak of the printed equations' rate is looked for
-# |ln| of the ratio: the transition matrices of a run's intervals are good to 1e-5 each.
+# Largest number of intervals in which a peak of the rate is searched for, in a run of the printed
+# equations.
+_MOST_INTERVALS = 12
+# Allowed difference of the logarithms of stored and computed error growth. The transition matrix of
+# each interval has a relative error of 1e-5.
 _OWN_GROWTH = 0.05
 
 
 def checks_of(results: OpenResults, frozen: Sequence[OpenResults], bounds: Bounds) -> list[Check]:
-    """Return every check that an open file allows, in the order of its scenes.
+    """Return all checks of an open results file, in the order of its scenes.
 
     Parameters
     ----------
-    results : opened with verify=False, so that a row that has changed is judged, too.
-    frozen : the shipped references.
-    bounds : for all scenes; those of methods are added.
+    results : file opened with verify=False, so that a row whose checksum is wrong is judged, too.
+    frozen : open files of the shipped references.
+    bounds : bounds for all scenes. Bounds that methods bring themselves precede them.
 
     Raises
     ------
@@ -73,13 +77,15 @@ def checks_of(results: OpenResults, frozen: Sequence[OpenResults], bounds: Bound
     bounds = bounds.with_entries(bound for method in methods() for bound in method.bounds)
     shipped = {name: scene.reference for file in frozen for name, scene in file.scenes.items()}
     checks: list[Check] = []
-    with np.errstate(all="ignore"):  # a hostile file may hold any number; what overflows fails
+    # A file may hold any number. One that overflows fails a check, so that no warning is needed.
+    with np.errstate(all="ignore"):
         for scene in results.scenes.values():
-            # The bounds of a shipped scene are for its numbers, its samples too.
+            # The bounds of a shipped scene apply only if nothing in the stored scene is changed,
+            # not even the number of samples.
             own = replace(
                 bounds, scene="" if scene.changes is None or scene.changes else scene.name
             )
-            # Whether the reference itself stops early: the motion does not exist beyond.
+            # If the reference ends early in a singularity, the motion does not exist beyond it.
             motion_ends = scene.reference is not None and scene.reference.status == "singular"
             for run in scene.runs.values():
                 hint = "its row changed after it was written" if run.is_damaged else "as written"
@@ -87,7 +93,7 @@ def checks_of(results: OpenResults, frozen: Sequence[OpenResults], bounds: Bound
                     bounded(own, "integrity", _where(run, "row"), run.is_damaged, "rows", hint)
                 )
                 try:
-                    # Any error in a run that is known to be damaged is due to the damage.
+                    # If a row is known to be damaged, the damage is the cause of any error in it.
                     with reading(str(scene.name), run.method) if run.is_damaged else nullcontext():
                         faults, solution = run.faults(), run.solution()
                         checks += _of_run(
@@ -98,7 +104,7 @@ def checks_of(results: OpenResults, frozen: Sequence[OpenResults], bounds: Bound
                         bounded(own, "complete", _where(run, "all"), math.nan, "faults", str(exc))
                     )
             checks += _of_reference(scene, shipped.get(scene.name) if own.scene else None, own)
-        # the paper's numbers, in units of their last printed digit
+        # Compare stored metrics with the paper's numbers, in units of their last printed digit.
         for claim in claims(results.scenes):
             if claim.printed is not None:
                 off = abs(round(claim.printed, claim.decimals) - claim.value) * 10**claim.decimals
@@ -123,14 +129,15 @@ def _of_run(
 ) -> Iterator[Check]:
     """Yield the checks of a run.
 
-    One that stops early and reports it is complete where the motion ends there.
+    Missing samples are no fault if the status of the run says that it stopped early, and if either
+    the motion ends in a singularity or the run is one of the printed equations.
 
     Parameters
     ----------
     run, bounds : the stored run, and the bounds of its scene.
-    solution : the run rebuilt from its samples; None where it cannot be.
+    solution : the run rebuilt from its samples; None if it cannot be rebuilt.
     faults : a line for each stored array that is missing or wrong.
-    reference : of the scene; None without one.
+    reference : samples of the scene's reference; None if it has none.
     motion_ends : whether the motion of the scene ends in a singularity.
     """
     reports_it = solution is not None and run.status not in COMPLETE
@@ -146,7 +153,7 @@ def _of_run(
     scene = solution.scene
     judgement = judge(scene, solution, reference)
     claimed = bool(run.attributes.get("false_success", 0))
-    # Whether a motion ended in a singularity can be decided from angles and rates alone.
+    # Without angles and rates it is not possible to decide whether a motion ended in a singularity.
     is_unknown = run.status == "singular" and not (scene.wants("angles") and scene.wants("rates"))
     wrong = (judgement.status != run.status and not is_unknown) + (
         judgement.false_success != claimed
@@ -176,16 +183,16 @@ def _of_run(
 
 
 def _of_stored_interval(run: StoredRun, judgement: Judgement) -> Metrics:
-    """Return the metrics of the interval stored as the worst, if it may be the worst one.
+    """Return the metrics of the interval that is stored as the worst, if it may be the worst.
 
-    Of several nearly equal intervals the last bits of the samples decide which one is the worst,
-    and other hardware rounds them otherwise. Where the stored one is clearly less far beyond its
-    bound than the worst, the result is empty.
+    If several intervals are nearly equally far beyond their bounds, the last bits of the samples
+    decide which one is the worst, and other hardware may round these bits differently. The result
+    is empty if the stored interval is clearly less far beyond its bound than the worst one.
 
     Parameters
     ----------
-    run : has the end of the interval, defect_time.
-    judgement : of the samples, with their defects.
+    run : the stored run, whose metric defect_time is the end of the interval.
+    judgement : judgement of the run's samples, with their defects.
     """
     defects, metrics = judgement.defects, judgement.metrics
     stored = run.attributes.get("defect_time", math.nan)
@@ -198,7 +205,8 @@ def _of_stored_interval(run: StoredRun, judgement: Judgement) -> Metrics:
     is_as_far = (
         not has_bound or defects.judged_sizes[interval] >= defects.judged_sizes[worst] - floor
     )
-    if not metrics.get("defect_judged"):  # it is the one with the largest defect
+    # If no defect is beyond rounding, the worst interval is the one with the largest defect.
+    if not metrics.get("defect_judged"):
         is_as_far = is_as_far and defects.sizes[interval] >= defects.sizes[worst] - floor
     if not is_as_far:
         return {}
@@ -209,44 +217,45 @@ def _of_stored_interval(run: StoredRun, judgement: Judgement) -> Metrics:
 
 
 def _rounding(metrics: Metrics) -> float:
-    """Return the largest part of a defect (rad) that rounding of the samples may decide."""
+    """Return the largest change of a defect (rad) that rounding of the samples can cause."""
     return FLOOR_SAFETY * metrics.get("defect_floor", float(np.finfo(float).eps))
 
 
 def _changed_metric(run: StoredRun, metrics: Metrics, solution: Solution) -> tuple[str, float, str]:
-    """Return the stored number that is furthest from what the samples give.
+    """Return the stored metric with the largest relative difference from that of the samples.
 
     Parameters
     ----------
-    run, metrics : stored numbers, and those computed from the samples.
+    run, metrics : the stored run with its metrics, and the metrics computed from the samples.
     solution : the run rebuilt from its samples.
 
     Returns
     -------
     str
-        Name of the number.
+        Name of the metric.
     float
-        Its relative difference; 0 where all are within rounding.
+        Relative difference; 0 if the differences of all metrics are within rounding.
     str
-        Both values, as text.
+        Text with both values.
     """
     trajectory = solution.trajectory
     worst, hint, channel = 0.0, "stored numbers equal those of the samples", "stored numbers"
     if not any(name in run.attributes for name in metrics):
-        # a file of references keeps none, and a run without samples has none
+        # A file of references stores no metrics, and a run without samples has no metrics.
         return channel, worst, hint
     floor = _rounding(metrics)
     growth = min(float(running_growth(trajectory)[-1]), HORIZON_GROWTH)
-    # Differences due to the last bits of the samples, which other hardware rounds differently.
+    # Allow for differences due to the last bits of the samples, which other hardware may round
+    # differently.
     allowances = {name: floor * value.rounding for name, value in METRICS.items() if value.rounding}
     allowances["defect_drift"] *= growth
-    # Proportional to the growth of an error over an interval; without an excess the interval is
-    # arbitrary.
+    # The allowed defect is proportional to the computed error growth over its interval. If no
+    # defect is beyond rounding, any interval may be the stored one.
     is_beyond = metrics.get("defect_excess", 0.0) > floor
     allowances["defect_allowed"] = (
         _OWN_GROWTH * metrics.get("defect_allowed", 0.0) if is_beyond else math.inf
     )
-    # Angles and rates that are not stored are NaN here.
+    # Angles and rates that are not stored are NaN, so that their metrics cannot be compared.
     lacking = set() if solution.scene.wants("rates") else {"rotor_rate_max"}
     if not solution.scene.wants("angles"):
         lacking |= {"rotor_angle_min", "rotor_angle_max"}
@@ -272,12 +281,13 @@ def _changed_metric(run: StoredRun, metrics: Metrics, solution: Solution) -> tup
 
 
 def _own_extremes(solution: Solution) -> dict[str, float]:
-    """Return the extremes of a run of the printed equations at ode45's own points.
+    """Return the rotor's extremes at ode45's own output points, in a run of the printed equations.
 
-    These lie between the samples, too. The equations are integrated again from the samples beside
-    the extremes, and from those where the rate bends most: where a blade passes its singular pitch,
-    a peak is narrower than an interval. The result is empty for a run that broke off, which may
-    have been singular after its last sample, and where loads change over time.
+    An output point may lie between samples. Therefore the equations are integrated again over the
+    intervals beside the samples with extreme values, and over those in which the slope of the rate
+    changes most. Where a blade passes its singular pitch, a peak of the rate is narrower than an
+    interval. The result is empty if loads change over time. It is also empty for a run that broke
+    off, because the run may have become singular after its last sample.
 
     Parameters
     ----------
@@ -314,10 +324,10 @@ def _own_extremes(solution: Solution) -> dict[str, float]:
 
 
 def settings_faults(run: StoredRun) -> list[str]:
-    """Return what is wrong with the stored settings, a line for each fault.
+    """Return what is wrong with the stored settings of a run, a line for each fault.
 
-    Each setting of the method of `run` must be there, no other, and each within its range. The
-    list is empty for an unknown method.
+    All settings of the run's method must be stored, each within its range, and no other setting.
+    The list is empty if the method is unknown.
     """
     method = find_method_or_none(run.method)
     if method is None:
@@ -332,15 +342,15 @@ def settings_faults(run: StoredRun) -> list[str]:
 
 
 def _of_reference(scene: StoredScene, shipped: StoredRun | None, bounds: Bounds) -> Iterator[Check]:
-    """Yield the checks of a file's reference against the shipped one of the same scene.
+    """Yield the checks of a stored reference against the shipped reference of the same scene.
 
-    A scene without a reference in the file fails.
+    A check fails if the file has no reference for the scene.
 
     Parameters
     ----------
-    scene : stored scene.
-    shipped : the shipped reference; None where there is none.
-    bounds : of the scene.
+    scene : the stored scene.
+    shipped : the shipped reference; None if the scene has none.
+    bounds : bounds of the scene.
     """
     stored = scene.reference
     hint = "an altered reference, or a changed scene or closed form"
@@ -350,7 +360,7 @@ def _of_reference(scene: StoredScene, shipped: StoredRun | None, bounds: Bounds)
             bounds, "reference", Where(scene.name, REFERENCE, "all"), math.nan, "rad", hint
         )
     elif shipped is not None:
-        if stored.is_frozen:  # it says that it was read from the shipped file
+        if stored.is_frozen:  # the stored reference is marked as read from the shipped file
             changed = []
             for name in ("angles", "rates", "error_growth", "angle_uncertainty"):
                 if name in shipped and name in stored:
@@ -379,7 +389,8 @@ def _of_reference(scene: StoredScene, shipped: StoredRun | None, bounds: Bounds)
                 first, off = shipped.array(name), math.nan
                 second = stored.array(name) if name in stored else np.empty(0)
                 if first.shape == second.shape and second.dtype.kind == "f":
-                    # the ratio, as far as both are positive and finite
+                    # Compare the samples at which the shipped value is positive and finite. A
+                    # stored value there that is not makes the result infinite or NaN, and fails.
                     used = np.isfinite(first) & (first > 0.0)
                     off = float(np.abs(np.log(second[used] / first[used])).max(initial=0.0))
                 yield bounded(

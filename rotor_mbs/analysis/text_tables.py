@@ -1,4 +1,4 @@
-"""Small tables for a terminal or a notebook: runs, methods over many runs, bench curves."""
+"""Make tables for a terminal or a notebook: of runs, methods, bench curves and sweep parameters."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ RUN_HEAD = (
     "energy drift",
     "time (s)",
 )
-MOST_ROWS = 40  # of a table with a row for each run
+MOST_ROWS = 40  # largest number of runs in a table with a row for each run
 
 
 def run_row(run: StoredRun) -> tuple[str, ...]:
-    """Return the cells of a run under RUN_HEAD."""
+    """Return the row of a run in a table with the heading RUN_HEAD."""
     facts = run.attributes
     shown = comparison(facts, float(run.scales["time"][-1]))
-    if run.method == REFERENCE:  # not compared with itself
+    if run.method == REFERENCE:  # the reference is not compared with itself
         shown = shown._replace(error="", compared="")
-    seconds = facts.get("run_time_s")  # none where the process was ended
+    seconds = facts.get("run_time_s")  # None if the process was ended
     time = "read" if run.is_frozen else "" if seconds is None else f"{seconds:.3g}"
     return run.method, run.status, *shown, short_number(facts.get("energy_drift_max")), time
 
@@ -41,14 +41,14 @@ def run_row(run: StoredRun) -> tuple[str, ...]:
 def table_of_runs(
     scenes: Mapping[str, StoredScene], wanted: Mapping[str, Iterable[str]]
 ) -> TextTable:
-    """Return a row for each of the requested runs and their references.
+    """Return a table with a row for each requested run and for the reference of each scene.
 
     If there are more than MOST_ROWS runs, the table has a row for each method instead.
 
     Parameters
     ----------
     scenes : stored scenes by name.
-    wanted : names of methods by scene name.
+    wanted : names of the requested methods by scene name.
     """
     runs = []
     rows: list[tuple[str, ...]] = []
@@ -66,11 +66,14 @@ def table_of_runs(
 
 
 def method_table(runs: Iterable[StoredRun]) -> TextTable:
-    """Return a row for each method: how many runs ended well, and their largest numbers.
+    """Return a table with a row for each method: how many of its runs ended well, and numbers.
+
+    The numbers are the largest defect, error and energy drift of the runs that ended well, and the
+    longest run time of all runs.
 
     Parameters
     ----------
-    runs : of any scenes and methods.
+    runs : runs of any scenes and methods.
     """
     head = (
         "method",
@@ -97,10 +100,11 @@ def method_table(runs: Iterable[StoredRun]) -> TextTable:
 
 
 def bench_table(curves: Sequence[Record]) -> TextTable:
-    """Return a row for each curve: settings that are ok, smallest error, times to given errors.
+    """Return a table with a row for each curve: settings that are ok, smallest error, run times.
 
-    A time is empty if the curve does not reach the error, and "not measured" if it might with finer
-    settings, which the budget left out.
+    The run times are those to reach the errors TARGETS_RAD. If a curve does not reach an error, the
+    cell is empty. The cell is "not measured" if the time budget of the bench left out finer
+    settings, which might reach the error.
 
     Parameters
     ----------
@@ -135,7 +139,7 @@ def bench_table(curves: Sequence[Record]) -> TextTable:
 
 
 def sweep_parameters(sweep: StoredSweep) -> TextTable:
-    """Return a row for each varied parameter of a sweep: unit, range, number of values."""
+    """Return a table with a row for each varied parameter of a sweep: unit, range, value count."""
     rows = []
     for key in sweep.keys:
         name = parameter_name(key)
@@ -150,7 +154,7 @@ def sweep_parameters(sweep: StoredSweep) -> TextTable:
 
 @dataclass(frozen=True)
 class TextTable:
-    """Hold a table of text with a heading; it prints in columns, and as HTML in a notebook."""
+    """Hold a table of texts with a heading, which is printed in columns, in a notebook as HTML."""
 
     head: tuple[str, ...]
     rows: list[tuple[str, ...]]
