@@ -1,4 +1,4 @@
-"""Kinematics of a scene without any model: tip paths, energies and exact solutions."""
+"""Compute tip paths, energies and exact solutions of a scene, without any model."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def tip_paths(scene: Scene, angles: Array) -> Array:
 
     Parameters
     ----------
-    scene : tilt, cones and tips of its blades are used.
+    scene : the tilt of the shaft, and the azimuths, cones and tips of the blades are used.
     angles : (n, 1 + blades) rad, rotor first.
     """
     paths = np.empty((len(angles), len(scene.blades), 3))
@@ -30,11 +30,14 @@ def tip_paths(scene: Scene, angles: Array) -> Array:
 def kinetic_energy(scene: Scene, angles: Array, rates: Array) -> Array:
     """Return the kinetic energy of the blades and the hub, (n,) J.
 
-    That of a blade is ½ m v² + ½ ω·I ω with v = ω × r and ω = q̇2 e_shaft + θ̇ e_z(blade).
+    The energy of a blade is ½ m v² + ½ ω·I ω. The angular velocity is ω = q̇2 e_shaft + θ̇ e_z with
+    the blade's z axis, the velocity of the centre of mass is v = ω × r, and I is the inertia about
+    the centre of mass.
 
     Parameters
     ----------
-    scene : masses, centres of mass and inertias of its blades are used.
+    scene : the geometry of the rotor, the inertia of the hub, and the masses, centres of mass and
+        inertias of the blades are used.
     angles, rates : (n, 1 + blades) rad and rad/s, rotor first.
     """
     energy = np.empty(len(angles))
@@ -69,12 +72,13 @@ def _kinetic_energy(scene: Scene, angles: Array, rates: Array) -> Array:
 def potential_energy(scene: Scene, time: Array, angles: Array) -> Array:
     """Return the potential energy of weights and bearing springs, (n,) J.
 
-    That of weights is zero at the apex's height. A pitch that cannot move has no spring.
+    A weight has no potential energy at the height of the apex. The spring of a pitch without
+    inertia is left out, because this pitch does not move.
 
     Parameters
     ----------
     scene : gravity, blades and bearings are used.
-    time : (n,) s, for rest angles that change.
+    time : (n,) s, at which rest angles that change over time are evaluated.
     angles : (n, 1 + blades) rad, rotor first.
     """
     energy = np.empty(len(angles))
@@ -99,13 +103,13 @@ def _potential_energy(scene: Scene, time: Array, angles: Array) -> Array:
 
 
 def work_of_constant_loads(scene: Scene, angles: Array) -> Array | None:
-    """Return the work of the loads, (n,) J; None where it is no function of the angles.
+    """Return the work of constant loads, (n,) J; None if the work is no function of the angles.
 
-    That is where a load changes, or there is damping.
+    The work depends on more than the angles if a load changes over time, or if there is damping.
 
     Parameters
     ----------
-    scene : its torques and initial angles are used.
+    scene : the torques and the initial angles are used.
     angles : (n, 1 + blades) rad, rotor first.
     """
     if scene.has_damping or not scene.has_constant_loads:
@@ -115,13 +119,13 @@ def work_of_constant_loads(scene: Scene, angles: Array) -> Array | None:
 
 
 def _frames(scene: Scene, angles: Array, blade: int) -> Array:
-    """Return Rx(tilt) Ry(q2 + phase) Rx(-cone) Rz(θ), (n, 3, 3), of a blade.
+    """Return the rotation matrices of a blade, Rx(tilt) Ry(q2 + phase) Rx(-cone) Rz(θ), (n, 3, 3).
 
-    The columns are the blade's axes in the base frame.
+    The columns of a matrix are the blade's axes in the base frame.
 
     Parameters
     ----------
-    scene : its tilt, and phase and cone of the blade, are used.
+    scene : the tilt of the shaft, and the phase and the cone of the blade are used.
     angles : (n, 1 + blades) rad, rotor first.
     blade : number of the blade, from 0.
     """
@@ -138,24 +142,29 @@ def _frames(scene: Scene, angles: Array, blade: int) -> Array:
 
 
 def _about_x(angle: float) -> Array:
-    """Return the right-handed rotation about x, (3, 3)."""
+    """Return the matrix of a right-handed rotation about x by an angle (rad), (3, 3)."""
     c, s = math.cos(angle), math.sin(angle)
     return np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
 
 
 def _rotated(frames: Array, point: tuple[float, float, float]) -> Array:
-    """Return a vector of a blade in the base frame, (n, 3) m."""
+    """Return a point that is given in a blade's frame, in the base frame, (n, 3) m."""
     return np.asarray(frames @ np.array(point))
 
 
 def exact_rotor_angle(scene: Scene, time: Array) -> tuple[str, Array] | None:
-    """Return the name of an exact solution and the rotor's angle by it; None if none is known.
+    """Return the name of an exact solution and its rotor angle; None if no solution is known.
 
-    It is known where every pitch stays at zero. One blade let go at rest: a pendulum (elliptic
-    functions; Abramowitz & Stegun 22.2). Equal blades in balance: gravity cancels, a constant
-    torque gives q0 + Ω0 t + τ t² / (2 I). On a tilted shaft gravity turns the pitches of blades
-    whose centre of mass is off the pitch axis, and a cone those that have a moment of inertia about
-    it.
+    Exact solutions are known for two kinds of rotors, if every pitch stays at zero:
+
+    - One blade that is released at rest is a pendulum (elliptic functions; Abramowitz & Stegun
+      22.2).
+    - Several equal blades are in balance, so that gravity has no moment about the shaft. A constant
+      torque τ gives the rotor angle q0 + Ω0 t + τ t² / (2 I).
+
+    On a tilted shaft, gravity turns the pitch of a blade whose centre of mass is off its pitch
+    axis. With a cone, the rotation of the rotor turns a pitch that has inertia. No solution is
+    known in these two cases.
 
     Parameters
     ----------
@@ -167,10 +176,10 @@ def exact_rotor_angle(scene: Scene, time: Array) -> tuple[str, Array] | None:
     str
         "pendulum", "constant torque", "uniform rotation" or "rest".
     ndarray
-        (n,) rad.
+        Rotor angle, (n,) rad.
     """
-    # Zero pitch is invariant for blades that their own x-z plane mirrors; nothing may damp the
-    # rotor.
+    # A pitch stays at zero if the blade is symmetric about its own x-z plane and no load acts on
+    # the pitch. No exact solution is known if the shaft has damping.
     mirrored = all(
         b.centre_of_mass[1] == 0.0 and b.inertia[3] == 0.0 and b.inertia[5] == 0.0
         for b in scene.blades
@@ -199,22 +208,24 @@ def exact_rotor_angle(scene: Scene, time: Array) -> tuple[str, Array] | None:
 
 
 def _inertia_at_zero_pitch(blade: Blade) -> float:
-    """Return a blade's inertia about the shaft, kg m².
+    """Return a blade's inertia about the shaft at zero pitch, kg m².
 
-    It is that about its own y axis, or that of a rod inclined by its cone.
+    Without a cone it is the inertia about the blade's own y axis. A blade with a cone has no
+    inertia about its pitch axis: it is a thin rod that is inclined by the cone.
     """
     yy: float = blade.inertia_about_apex()[1]
     return yy * math.cos(blade.cone) ** 2 if blade.cone else yy
 
 
 def _pendulum(scene: Scene, time: Array) -> tuple[str, Array] | None:
-    """Return "pendulum" and its angle by elliptic functions, (n,) rad.
+    """Return "pendulum" and the rotor angle by elliptic functions, (n,) rad.
 
-    None is returned for a rotor that is driven, turns at the start, or has no restoring moment.
+    None is returned for a rotor that is driven, turns at the start or has no restoring moment, or
+    whose centre of mass is half a turn or more from straight down at the start.
 
     Parameters
     ----------
-    scene : of one blade.
+    scene : a scene with one blade.
     time : (n,) s.
     """
     from scipy.special import ellipj, ellipk
@@ -222,17 +233,18 @@ def _pendulum(scene: Scene, time: Array) -> tuple[str, Array] | None:
     blade = scene.blades[0]
     x, _, z = blade.centre_of_mass
     arm, lead = math.hypot(x, z), math.atan2(x, z)
-    if scene.has_tilt_or_cone:  # gravity across the shaft, and the distance from it
+    # Only gravity normal to the shaft and the distance from the shaft have an effect.
+    if scene.has_tilt_or_cone:
         arm *= math.cos(scene.shaft_tilt) * math.cos(blade.cone)
     if scene.has_torque or scene.initial_rates[0] or not scene.gravity or not arm:
         return None
     frequency = math.sqrt(
         blade.mass * scene.gravity * arm / (scene.hub_inertia + _inertia_at_zero_pitch(blade))
     )
-    amplitude = math.pi - (scene.initial_angles[0] + lead)  # from straight down
+    amplitude = math.pi - (scene.initial_angles[0] + lead)  # initial angle from straight down
     if not -math.pi < amplitude < math.pi:
         return None
-    # It starts at rest: a quarter of a period (ellipk) before it passes straight down.
+    # The pendulum starts at rest, a quarter of a period (ellipk) before it passes straight down.
     modulus = math.sin(amplitude / 2.0)
     sn = ellipj(ellipk(modulus**2) - frequency * time, modulus**2)[0]
     return "pendulum", math.pi - 2.0 * np.arcsin(modulus * sn) - lead

@@ -1,10 +1,12 @@
-"""Numbers, claims and errata of the paper, and how many of them stored runs reproduce.
+"""Read the paper's numbers, claims and errata, and count how many of them stored runs reproduce.
 
-They are read from the shipped files under `reference/`, with the check of each printed entry.
+Numbers, claims and errata are read from the shipped files under `reference/`, as is the check of
+each printed entry.
 
-The paper's runs are chaotic: a claim may hold for one rounding and fail for the next. So its
-verdict is that of runs from many starts moved by rounding, for several durations, as
-reference/claims.json has it.
+The paper's runs are chaotic: rounding errors decide whether a claim holds in a run. Therefore the
+verdict on a claim does not come from a stored run. It comes from many runs with several durations,
+whose initial states are moved by the size of rounding errors. reference/claims.json has the
+verdicts.
 """
 
 from __future__ import annotations
@@ -24,19 +26,19 @@ from rotor_mbs.solution.status import GOOD
 
 @dataclass(frozen=True)
 class Published:
-    """Hold a number or claim of the paper, as in reference/published.toml.
+    """Hold a number or a claim of the paper, as in reference/published.toml.
 
     Attributes
     ----------
-    id, figure, quote : identifier, place in the paper and its words.
-    statement, tests : of a claim.
-    scene, metric, value, decimals : of a number: it is this metric of a run of the scene, rad or
-        rad/s.
-    rounding : of a number, whether it is amplified rounding error, which depends on how the
+    id, figure, quote : identifier, the paper's figure, and the paper's words.
+    statement, tests : for a claim, its statement, and the conditions under which it holds.
+    scene, metric : for a number, the scene of its run, and the metric of this run that it is.
+    value, decimals : for a number, the printed value (rad or rad/s) and its number of decimals.
+    rounding : for a number, whether it is an amplified rounding error, which depends on how the
         equations are written.
-    scenes : names of the scenes whose runs decide it.
-    printed, corrected : of a number, what a file's runs of the printed and the corrected model give
-        (`claims`).
+    scenes : names of the scenes whose runs are needed to decide the number or claim.
+    printed, corrected : for a number, the metric in a file's runs of the printed and the corrected
+        model, set by `claims`; None if there is no such run.
     """
 
     id: str
@@ -55,13 +57,13 @@ class Published:
 
     @property
     def is_number(self) -> bool:
-        """Return whether it is a number, not a claim in words."""
+        """Return whether this is a number; otherwise it is a claim in words."""
         return bool(self.metric)
 
 
 @dataclass(frozen=True)
 class Erratum:
-    """Hold an error in the printed equations; fields as in reference/errata.toml."""
+    """Hold an error in the printed equations; reference/errata.toml describes the fields."""
 
     id: str
     entry: str
@@ -75,16 +77,16 @@ class Erratum:
 
 
 class CheckedEntry(NamedTuple):
-    """Hold one printed entry and its derivative, as formulas.
+    """Hold an entry of a printed equation, and the correct entry, as formulas.
 
     Attributes
     ----------
-    equation, entry : which one it is.
-    printed, right : formulas.
+    equation, entry : number of the equation, and place in it, such as "row 1 column 2".
+    printed, right : the printed formula, and the formula derived from equation (3).
     difference : the largest of |printed - right| / max(1, |printed|, |right|) over random states.
-    agrees : whether both agree.
-    explained_by : the fewest errata with which the paper's derivation gives what is printed, as
-        "E1, E2"; "" where it agrees, or where nothing explains it.
+    agrees : whether both formulas agree.
+    explained_by : the fewest errata with which the paper's derivation gives the printed formula,
+        such as "E1, E2"; "" if the formulas agree, or if no errata explain the difference.
     """
 
     equation: str
@@ -97,7 +99,7 @@ class CheckedEntry(NamedTuple):
 
 
 def published() -> tuple[Published, ...]:
-    """Return all numbers and claims, in the order of the file."""
+    """Return all numbers and claims of the paper, in the order of reference/published.toml."""
     items = []
     for table in _tables("published")["published"]:
         sides = [
@@ -109,15 +111,15 @@ def published() -> tuple[Published, ...]:
 
 
 def conditions() -> dict[str, str]:
-    """Return the conditions that had to be found out to reproduce the numbers.
+    """Return conditions that the paper does not print, but that its numbers depend on.
 
-    They are texts by subject (gravity, duration) or scene (fig05).
+    The conditions are texts by subject (gravity, duration) or scene (fig05).
     """
     return dict(_tables("published")["conditions"])
 
 
 def errata() -> tuple[Erratum, ...]:
-    """Return the errata, in the order of the file."""
+    """Return the errata of the paper, in the order of reference/errata.toml."""
     return tuple(Erratum(**table) for table in _tables("errata")["erratum"])
 
 
@@ -126,10 +128,10 @@ def _tables(name: str) -> dict[str, Any]:
 
 
 def checked_entries() -> list[CheckedEntry]:
-    """Return every printed entry with the derivative of equation (3), in the paper's order.
+    """Return every printed entry with that derived from equation (3), in the paper's order.
 
-    They are read from reference/errata-check.csv. Tests compute every entry
-    (`tests/support/printed_entries.py`) and compare the file with it.
+    The entries are read from reference/errata-check.csv. Tests compute all entries again
+    (`tests/support/printed_entries.py`) and compare the file with the result.
     """
     with (REFERENCES / "errata-check.csv").open(encoding="utf-8", newline="") as file:
         rows: list[dict[str, Any]] = list(csv.DictReader(file))
@@ -143,18 +145,18 @@ HOLDS, FAILS, UNDECIDED = "holds", "fails", "undecided"
 
 @dataclass(frozen=True)
 class ClaimStudy:
-    """Hold the verdicts on the claims in words, tested on many runs.
+    """Hold the verdicts on the claims in words, which were tested on many runs.
 
     Attributes
     ----------
-    rule : of the verdicts, in words.
+    rule : the rule in words by which a claim gets its verdict.
     runs : number of runs of each scene for each duration.
-    durations : s.
-    spread : rad, by which their initial states were moved at most.
-    methods : the printed and the corrected equations.
-    verdicts : "holds", "fails" or "undecided" of each claim by method.
-    shares : of each claim by method, for each duration: the share of the deciding runs in which it
-        holds (None where none decides), and how many decide.
+    durations : durations of the runs, s.
+    spread : largest change of the initial states, rad.
+    methods : names of two methods, one with the printed, one with the corrected equations.
+    verdicts : for each claim and method "holds", "fails" or "undecided".
+    shares : for each claim and method a pair for each duration: the share of the deciding runs in
+        which the claim holds (None if no run is deciding), and the number of deciding runs.
     """
 
     rule: str
@@ -166,13 +168,13 @@ class ClaimStudy:
     shares: Mapping[str, Mapping[str, Sequence[tuple[float | None, int]]]]
 
     def count(self, method: str, verdict: str) -> int:
-        """Return how many claims have this verdict by the method."""
+        """Return the number of claims to which the runs of a method give this verdict."""
         return sum(verdicts[method] == verdict for verdicts in self.verdicts.values())
 
 
 @functools.cache
 def claim_study() -> ClaimStudy:
-    """Read reference/claims.json, which `tests/support/make_claims.py` makes.
+    """Return the verdicts of reference/claims.json, which `tests/support/make_claims.py` writes.
 
     >>> claim_study().verdicts["fig11-pitches-grow"]["printed/ode45"]
     'holds'
@@ -181,23 +183,24 @@ def claim_study() -> ClaimStudy:
     return ClaimStudy(**{field.name: stored[field.name] for field in fields(ClaimStudy)})
 
 
-# Share of a scene's energy scale. The drift of ode45 itself at the paper's tolerances is below a
-# thousandth of that (3e-7 of the scale at most, on the corrected equations).
+# An energy gain above this share of the scene's energy scale is due to the equations. The error of
+# ode45 is smaller: at the paper's tolerances the energy drift of the corrected equations is at most
+# 3e-7 of the scale.
 ENERGY_RISE = 1e-3
 
 
 def claims(
     scenes: Mapping[str, StoredScene], items: Iterable[Published] | None = None
 ) -> list[Published]:
-    """Return the numbers and claims that runs of the paper's scenes can be compared with.
+    """Return the numbers and claims that the runs of stored scenes can be compared with.
 
-    A claim needs all of its scenes, a number a run that has its metric. A scene that was changed
-    under its name is not the paper's.
+    For a claim all of its scenes are needed, for a number a run that has its metric. A scene whose
+    motion was changed does not count, although it has the name of a scene of the paper.
 
     Parameters
     ----------
     scenes : stored scenes by name.
-    items : numbers and claims; all of the paper by default.
+    items : numbers and claims to choose from; all of the paper by default.
     """
     results = []
     for item in published() if items is None else items:
@@ -216,7 +219,7 @@ def claims(
 
 
 def rounds_to(value: float, item: Published) -> bool:
-    """Return whether `value`, rounded as it would be printed, is the printed number."""
+    """Return whether a value, rounded to the decimals of the printed number, equals this number."""
     return f"{value:.{item.decimals}f}" == f"{item.value:.{item.decimals}f}"
 
 
@@ -225,18 +228,16 @@ def finding(
 ) -> list[tuple[str, str, str]]:
     """Return how much of the paper is reproduced, and the energy that its equations gain.
 
-    The list is empty for other scenes.
-
     Parameters
     ----------
     scenes : stored scenes by name.
-    claims : as `claims` returns them for these scenes.
+    claims : result of `claims` for these scenes.
 
     Returns
     -------
     list of tuple of str
-        A result, and what the equations as printed and the corrected model give; "" where nothing
-        is known.
+        A row for each result that is known: its name, its value for the equations as printed, and
+        its value for the corrected model. A value that is not known is "".
     """
     claims = list(claims)
     numbers = [claim for claim in claims if claim.is_number]

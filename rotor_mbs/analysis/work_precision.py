@@ -1,4 +1,4 @@
-"""Numbers of a work-precision diagram: Pareto front, time to an accuracy, orders."""
+"""Compute the numbers of a work-precision diagram: Pareto front, time to an accuracy, orders."""
 
 from __future__ import annotations
 
@@ -13,31 +13,33 @@ from rotor_mbs.runs.read import Record
 from rotor_mbs.solution.status import COMPLETE, code_of
 from rotor_mbs.solution.trajectory import Array
 
-TARGETS_RAD = (1e-3, 1e-6, 1e-9)
+TARGETS_RAD = (1e-3, 1e-6, 1e-9)  # errors for which the run time is given
 
-ANGLE_ERROR = "angle_error_max"  # up to the horizon, rad
+ANGLE_ERROR = "angle_error_max"  # name of the column with the angle error up to the horizon, rad
 
-# An error as large as the motion itself: such a run is a failure, not a point on the curve.
+# An error of this size is as large as the motion itself. A run with such an error is a failure, not
+# a point on the curve.
 USELESS_RAD = 1.0
 
-# Errors below this, far under the rounding of a double of order one, are drawn and interpolated as
-# this value: zero has no logarithm.
+# Smaller errors are raised to this value, because zero has no logarithm. The value is far below the
+# rounding error of a double of order one.
 SMALLEST_ERROR = 1e-17
-# A curve turns into its round-off floor gradually: errors within this factor of the floor carry no
-# order.
+# A curve approaches its round-off floor gradually. Errors within this factor of the floor do not
+# show the order of the method.
 _ABOVE_FLOOR = 20.0
-# Above this error a step is too coarse for its order to show.
+# A step with a larger error is too coarse to show the order of the method.
 _ASYMPTOTIC_RAD = 0.05
-_FITTED = 4  # points, the finest ones above the floor
+# Largest number of points to which an order is fitted: the finest ones above the floor.
+_FITTED = 4
 
 
 class Reach(NamedTuple):
-    """Tell when a curve reaches an error.
+    """Hold the run time that a curve needs to reach an error.
 
     Attributes
     ----------
-    seconds : s of run time.
-    ratio : how many times the run time of the fastest curve.
+    seconds : run time, s.
+    ratio : run time divided by that of the fastest curve.
     """
 
     seconds: float
@@ -45,14 +47,16 @@ class Reach(NamedTuple):
 
 
 def succeeded(curve: Record, error: str = ANGLE_ERROR) -> NDArray[np.bool_]:
-    """Return which points are on the curve, (settings,): run to the end, with a useful error.
+    """Return whether each point is on the curve, (settings,).
 
-    The error of the angles is below USELESS_RAD; a coarse point need not be ok.
+    A point is on the curve if its run reached the end of the scene, if the error and the run time
+    are finite, and if the angle error is below USELESS_RAD. The status of a coarse point may be
+    "inaccurate".
 
     Parameters
     ----------
     curve : record of a bench.
-    error : column of errors that must be finite.
+    error : name of the column of errors.
     """
     is_complete = np.isin(curve.arrays["status"], [code_of(status) for status in COMPLETE])
     is_known = np.isfinite(curve.arrays[error]) & np.isfinite(curve.arrays["run_time_s"])
@@ -60,17 +64,17 @@ def succeeded(curve: Record, error: str = ANGLE_ERROR) -> NDArray[np.bool_]:
 
 
 def failed(curve: Record) -> NDArray[np.bool_]:
-    """Return which points are failures, (settings,).
+    """Return whether each point is a failure, (settings,).
 
-    They were run, and are neither on the curve nor left out by the budget.
+    A failure was run, that is, not left out by the time budget, and is not on the curve.
     """
     return np.asarray(~succeeded(curve) & (curve.arrays["status"] != code_of("left_out")))
 
 
 def left_out(curve: Record) -> int:
-    """Return how many of the finest settings of its ladder the budget left out.
+    """Return the number of settings of a ladder that the time budget of the bench left out.
 
-    An error that the curve does not reach might be reached by these.
+    These settings are the finest ones. They might reach an error that the curve does not reach.
     """
     return curve.statuses.count("left_out")
 
@@ -81,7 +85,7 @@ def points(curve: Record, error: str = ANGLE_ERROR) -> tuple[Array, Array]:
     Parameters
     ----------
     curve : record of a bench.
-    error : column of the errors; those below SMALLEST_ERROR are raised to it.
+    error : name of the column of errors. Errors below SMALLEST_ERROR are raised to it.
     """
     chosen = succeeded(curve, error)
     return np.maximum(curve.arrays[error][chosen], SMALLEST_ERROR), curve.arrays["run_time_s"][
@@ -90,9 +94,10 @@ def points(curve: Record, error: str = ANGLE_ERROR) -> tuple[Array, Array]:
 
 
 def pareto(errors: Array, seconds: Array) -> NDArray[np.intp]:
-    """Return the indices of the points that no other beats in both error and time.
+    """Return the indices of the points on the Pareto front of error and run time.
 
-    They are sorted by rising time; errors fall strictly.
+    No other point has both a smaller error and a shorter time. The points are sorted by increasing
+    time, and their errors strictly decrease.
 
     Parameters
     ----------
@@ -106,15 +111,15 @@ def pareto(errors: Array, seconds: Array) -> NDArray[np.intp]:
 
 
 def time_to_reach(errors: Array, seconds: Array, target: float) -> float | None:
-    """Return the run time (s) that an error needs; None where no point is as accurate.
+    """Return the run time (s) that is needed for an error; None if no point is as accurate.
 
-    It is interpolated on the Pareto front, linearly in the logarithms. Where already the fastest
-    point is more accurate than requested, it is the time of that point.
+    The time is interpolated on the Pareto front, linearly in the logarithms. If the fastest point
+    is already more accurate than requested, its time is returned.
 
     Parameters
     ----------
     errors, seconds : (points,) rad and s.
-    target : rad.
+    target : the error, rad.
     """
     front = pareto(errors, seconds)
     if not len(front) or errors[front[-1]] > target:
@@ -130,7 +135,7 @@ def fastest(curves: Sequence[Record], target: float) -> list[tuple[Record, Reach
     Parameters
     ----------
     curves : records of a bench.
-    target : rad.
+    target : the error, rad.
     """
     times = [(curve, time_to_reach(*points(curve), target)) for curve in curves]
     able = sorted(
@@ -140,9 +145,10 @@ def fastest(curves: Sequence[Record], target: float) -> list[tuple[Record, Reach
 
 
 def fitted_order(steps: Array, errors: Array) -> float | None:
-    """Return the slope of log error over log step; None with fewer than two usable points.
+    """Return the order of a method: the slope of the log of the error over the log of the step.
 
-    It is fitted to the finest points above the round-off floor.
+    The slope is fitted to the finest points above the round-off floor. None is returned if there
+    are fewer than two such points.
 
     Parameters
     ----------
@@ -153,8 +159,9 @@ def fitted_order(steps: Array, errors: Array) -> float | None:
     h, e = steps[usable], errors[usable]
     if len(e) < 2:
         return None
-    # Errors stop falling at a round-off floor: the smallest is not the last one, or the last slope
-    # is clearly below the median. Points near the floor are then left out.
+    # Errors stop decreasing at a round-off floor. The curve has reached its floor if the smallest
+    # error is not the last one, or if the last slope is clearly below the median. Then points near
+    # the floor are left out.
     slopes = np.diff(np.log(e)) / np.diff(np.log(h))
     if int(np.argmin(e)) < len(e) - 1 or bool(slopes[-1] < 0.75 * np.median(slopes)):
         above = e > _ABOVE_FLOOR * e.min()
@@ -164,20 +171,21 @@ def fitted_order(steps: Array, errors: Array) -> float | None:
 
 
 def step_for(target: float, steps: Array, errors: Array) -> float | None:
-    """Return the step (s) below which the error stays below `target`; None where it does not.
+    """Return the step (s) up to which the error is at most `target`; None if there is no such step.
 
-    It is interpolated linearly in the logarithms.
+    The step is interpolated linearly in the logarithms. The coarsest step is returned if all errors
+    are at most `target`.
 
     Parameters
     ----------
-    target : rad.
+    target : the error, rad.
     steps : (points,) s, coarse to fine.
     errors : (points,) rad.
     """
     below = errors <= target
     if not below.any() or not below[-1]:
         return None
-    # The last step whose error is above the target; -1 where all are below.
+    # Index of the last step whose error is above the target; -1 if no error is above it.
     last = len(errors) - 1 - int(np.argmin(below[::-1])) if not below.all() else -1
     if last < 0 or not np.isfinite(errors[last]) or errors[last + 1] == 0.0:
         return float(steps[last + 1])
@@ -186,11 +194,11 @@ def step_for(target: float, steps: Array, errors: Array) -> float | None:
 
 
 def values_of(curves: Iterable[Record], column: str) -> list[float]:
-    """Return the finite values of a column over the points on some curves.
+    """Return the finite values of a column at the points that are on given curves.
 
     Parameters
     ----------
-    curves : records of a bench; those without the column are left out.
+    curves : records of a bench; records without the column are left out.
     column : name of the column.
     """
     values = [curve.arrays[column][succeeded(curve)] for curve in curves if column in curve.arrays]
@@ -198,6 +206,6 @@ def values_of(curves: Iterable[Record], column: str) -> list[float]:
 
 
 def by_scene(curves: Sequence[Record]) -> Mapping[str, list[Record]]:
-    """Return the curves of each scene, in order."""
+    """Return the curves by name of the scene, in the given order."""
     names = dict.fromkeys(curve.scene for curve in curves)
     return {name: [curve for curve in curves if curve.scene == name] for name in names}
