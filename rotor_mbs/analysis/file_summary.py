@@ -1,4 +1,4 @@
-"""Summary of a file that this program wrote: its content, and what to do with it next."""
+"""Summarize a file that this program wrote: its content, and commands to use it."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ from rotor_mbs.runs.versions import made_with
 from rotor_mbs.scenario.keys import counted
 from rotor_mbs.solution.status import GOOD, STATUSES
 
-_WIDTH = 110  # characters of a line
-_MOST_FAILED = 5  # runs that are not ok, with their reasons
+_WIDTH = 110  # largest number of characters in a line
+_MOST_FAILED = 5  # largest number of runs that are listed with the reason why they are not ok
 
 
 @dataclass
@@ -32,15 +32,16 @@ class FileSummary:
 
     Attributes
     ----------
-    path, kind : the file, and "results", "sweep", "modes" or "comparison".
-    attributes : of the file: versions of the programs that made it, the machine, and when.
+    path : the file.
+    kind : kind of the file: "results", "sweep", "modes" or "comparison".
+    attributes : attributes of the file, among them the versions of the programs that made it.
     scenes, methods, outputs : names, in the order of the file.
-    labels : by scene name, with what was changed in a shipped scene.
-    runs : labels of all rows of a results file, in the order of the file, with those that are not
-        computed yet.
-    statuses : number of runs, or comparisons, with each status.
-    lines, tables : further text for a file of its kind.
-    next : commands and calls, each with what it does.
+    labels : label of each scene by its name, with the changes to a shipped scene.
+    runs : labels of all rows of a results file, in the order of the file. Rows that are not
+        computed yet are included.
+    statuses : number of runs, or of comparisons, by status.
+    lines, tables : further lines and tables, which depend on the kind of the file.
+    next : commands and Python calls to use the file, each with a description.
     """
 
     path: Path
@@ -101,18 +102,18 @@ def counts(statuses: Mapping[str, int]) -> str:
 
 
 def shortened(names: Sequence[str]) -> str:
-    """Return names as a list of at most eight, with the number of all if there are more."""
+    """Return names as a text: at most eight of them, and the number of all if there are more."""
     shown = ", ".join(names[:8])
     return f"{shown}, ... ({len(names)} in all)" if len(names) > 8 else shown
 
 
 def summary_of(path: Path) -> FileSummary:
-    """Return a summary of what is in the file at `path`.
+    """Return a summary of the content of a file.
 
     Raises
     ------
     StoreError
-        If it cannot be read or was not written by this program.
+        If the file at `path` cannot be read or was not written by this program.
     """
     kind = read_trailer(path).kind
     refuse_split(path, kind)
@@ -130,9 +131,11 @@ def summary_of(path: Path) -> FileSummary:
 def _results(path: Path) -> FileSummary:
     """Return the summary of a results file: scenes, methods, statuses, benches and ladders.
 
+    The first few runs that failed are listed, each with its reason.
+
     Parameters
     ----------
-    path : the file; the first few runs that failed are listed with their reasons.
+    path : the file.
     """
     curves, ladders = read_records(path, "bench"), read_records(path, "stability")
     with open_results(path) as results:
@@ -156,7 +159,8 @@ def _results(path: Path) -> FileSummary:
             summary.lines.append(f"... {len(failed) - _MOST_FAILED} more runs that are not ok")
         if results.scenes:
             summary.tables = [_scene_table(results.scenes.values()), method_table(runs)]
-        # A bench, the stability suite and files of references have no run that could be checked.
+        # A file may have no run to check: only points of a bench or of the stability suite, or only
+        # references.
         if runs:
             summary.next = [
                 (f"rotor-mbs check {path}", "accuracy verdicts; exit status 1 where one fails")
@@ -176,7 +180,7 @@ def _unique(names: Iterable[str]) -> list[str]:
 
 
 def _scene_table(scenes: Iterable[StoredScene]) -> TextTable:
-    """Return a row for each of the stored `scenes`: size, origin of the reference, statuses."""
+    """Return a table with a row for each of the stored `scenes`: size, reference, statuses."""
     rows: list[tuple[str, ...]] = []
     for stored in scenes:
         scene = stored.scene
@@ -197,11 +201,13 @@ def _scene_table(scenes: Iterable[StoredScene]) -> TextTable:
 
 
 def _sweep(path: Path) -> FileSummary:
-    """Return the summary of a sweep: its parameters, and how many runs have which status.
+    """Return the summary of a sweep: its parameters, and the number of runs by status.
+
+    Runs whose rows were damaged after they were written are counted as "damaged", too.
 
     Parameters
     ----------
-    path : the dataset; runs that were damaged after they were written are counted.
+    path : the file.
     """
     sweep = StoredSweep(path, allow_damaged_runs=True)
     codes = sweep.column("status")
@@ -231,7 +237,7 @@ def _sweep(path: Path) -> FileSummary:
 
 
 def _modes(path: Path) -> FileSummary:
-    """Return the summary of a file of modes, with the modes of each scene as text."""
+    """Return the summary of a file of modes, with the modes of each scene as lines of text."""
     found = read_modes(path)
     summary = FileSummary(path, MODES, TableFile(path, ()).attributes, list(found))
     summary.labels = {name: modes.label for name, modes in found.items()}
@@ -245,7 +251,9 @@ def _modes(path: Path) -> FileSummary:
 
 
 def _comparison(path: Path) -> FileSummary:
-    """Return the summary of a file of comparisons: a row for each, and why they do not agree.
+    """Return the summary of a file of comparisons.
+
+    It has a table with a row for each comparison, and lines with the reasons why data disagree.
 
     Parameters
     ----------

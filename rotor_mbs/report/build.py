@@ -28,18 +28,24 @@ from rotor_mbs.runs.read import is_sweep, open_results, read_records
 from rotor_mbs.runs.sweeps import StoredSweep
 from rotor_mbs.runs.versions import made_with
 
-# Groups of pages per worker: each group opens the file anew; with more than one, workers that are
-# done early take another group.
+# Pages are divided into this number of groups per worker. A group is one task of a worker, which
+# opens the file anew for it. With more than one group per worker, a worker that ends early takes
+# another one.
 _GROUPS = 2
-_TIMEOUT_S = 600.0
+_TIMEOUT_S = 600.0  # time limit for a group of pages, s
 
-OnPage = Callable[[int, int], None]  # called with the number of pages made, and of all
+# A function that is called with the number of pages made so far, and with the number of all pages.
+OnPage = Callable[[int, int], None]
 
 
 class Page(NamedTuple):
-    """A page before it is made: its file, its label in the navigation, and its content.
+    """Describe a page before it is made.
 
-    A page with the label "" is not in the navigation.
+    Attributes
+    ----------
+    file : name of the page's file.
+    label : label of the page in the navigation; a page with the label "" is not in the navigation.
+    content : function that makes the content of the page.
     """
 
     file: str
@@ -50,24 +56,24 @@ class Page(NamedTuple):
 def write_report(
     results: Path, output: Path, jobs: Workers = 1, on_page: OnPage = lambda *_: None
 ) -> Path:
-    """Write the pages about a file into a folder, and return the path of the index.
+    """Write the pages about a file into a folder, and return the path of the index page.
 
     All pages are made before the first one is written.
 
     Parameters
     ----------
-    results : any file that this program writes.
-    output : the folder, which is made where it does not exist.
+    results : a file of any kind that this program writes.
+    output : the folder, which is created if it does not exist.
     jobs : number of processes, or an open pool.
-    on_page : called with the number of pages that are made, and of all; not for a sweep, which has
-        one page.
+    on_page : function that is called with the number of pages made so far, and with the number of
+        all pages. It is not called for a sweep, which has one page.
 
     Raises
     ------
     InputError
-        Where the folder has a file of a page's name that no report wrote.
+        If a file in the folder has the name of a page, but was not written by a report.
     StoreError
-        Where the file cannot be read or has nothing to report, or the folder cannot be written.
+        If the file cannot be read or has nothing to report, or the folder cannot be written.
     """
     if is_sweep(results):
         from rotor_mbs.report.pages.sweep import (
@@ -97,17 +103,17 @@ def write_report(
 
 
 def make_pages(results: Path, numbers: Sequence[int]) -> dict[str, str]:
-    """Return the HTML of the pages of these numbers by file name: one task of a process.
+    """Make some pages of a report, as one task of a process, and return their HTML by file name.
 
     Parameters
     ----------
-    results : the file.
-    numbers : indices in `pages_of`.
+    results : the results file.
+    numbers : indices of the pages in the list that `pages_of` returns.
 
     Raises
     ------
     StoreError
-        Where the file cannot be read.
+        If the file cannot be read.
     """
     with open_results(results) as opened, _without_warnings():
         pages = pages_of(Report(**vars(opened)))
@@ -124,8 +130,8 @@ def make_pages(results: Path, numbers: Sequence[int]) -> dict[str, str]:
 def _without_warnings() -> Iterator[None]:
     """Suppress warnings in the block.
 
-    A file may hold any number; a user has no use for a warning with a line of this program's source
-    where one overflows in a plot.
+    A file may hold any number, so that a number may overflow in a plot. The warning of an overflow
+    names a line of this program's source, which does not help a user.
     """
     with warnings.catch_warnings(), np.errstate(all="ignore"):
         warnings.simplefilter("ignore")
@@ -133,9 +139,10 @@ def _without_warnings() -> Iterator[None]:
 
 
 def pages_of(report: Report) -> list[Page]:
-    """Return the pages for what the file has.
+    """Return the pages of the report of a file, which depend on the content of the file.
 
-    The first one is the index; of a file of one scene it is that scene. Pages of scenes come last.
+    The first page is the index of the report. If the file has one scene, which is not of the
+    stability suite, the page of this scene is the first one. Other pages of scenes come last.
 
     Parameters
     ----------
@@ -144,7 +151,7 @@ def pages_of(report: Report) -> list[Page]:
     Raises
     ------
     StoreError
-        Where the file has neither scenes nor other results.
+        If the file has neither scenes nor other results.
     """
     modes, bench, compared = (
         read_records(report.path, kind) for kind in ("modes", "bench", "comparison")

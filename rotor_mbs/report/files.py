@@ -1,4 +1,4 @@
-"""Write pages as files: choose their names, make their HTML by a template, and write them."""
+"""Choose the file names of a report's pages, make their HTML from a template, and write them."""
 
 from __future__ import annotations
 
@@ -24,12 +24,14 @@ from rotor_mbs.runs.output_files import refuse_foreign, replace_file
 from rotor_mbs.runs.versions import made_with
 
 GENERATOR = "rotor_mbs report"
-_MARK = f'<meta name="generator" content="{GENERATOR}">'.encode()  # of every page
+# Every page has this tag, by which files that a report wrote are recognized.
+_MARK = f'<meta name="generator" content="{GENERATOR}">'.encode()
 INDEX = "index.html"
 _TEMPLATES = Path(__file__).resolve().parent / "templates"
-_LONGEST = 100  # characters; file systems allow 255 bytes
-_OTHERS = "data--"  # how names of pages of comparisons begin
-# The pages that are not scenes, by their name.
+# Largest number of characters of a scene's name in a file name. File systems allow 255 bytes.
+_LONGEST = 100
+_OTHERS = "data--"  # beginning of the file names of pages of comparisons
+# Names of the pages that are not pages of scenes.
 MAIN_PAGES = (
     "index",
     "claims",
@@ -41,24 +43,27 @@ MAIN_PAGES = (
     "sweep",
     "comparison",
 )
-_SCRIPTS = {  # by file: a text that is in a page that needs the script
+# For each script a text that is in the HTML of every page that needs the script.
+_SCRIPTS = {
     "plots": 'class="plot"',
     "tables": "aria-sort=",
     "viewer": 'class="viewer"',
     "map": 'id="sweep"',
 }
-MAX_NUMBERS = 150_000  # in a page's curves: 800 kB, so that a page has at most 1 MB
-_PLACE_OF_SCRIPTS = "<!-- scripts -->"
+# Largest number of numbers in the curves of a page. They take 800 kB, so that a page has at most
+# 1 MB.
+MAX_NUMBERS = 150_000
+_PLACE_OF_SCRIPTS = "<!-- scripts -->"  # comment in the template that the scripts replace
 Pairs = Sequence[tuple[str, str]]
-# Control characters but those of lines and tabs, and halves of surrogate pairs: names and messages
-# come from any file.
+# Characters that are not allowed in a page: control characters except line breaks and tabs, and
+# halves of surrogate pairs. A name or a message from a file may have them.
 _UNPRINTABLE = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ud800-\udfff]")
 
 
 def page_names(scenes: Iterable[str]) -> dict[str, str]:
-    """Choose a file name for each scene: "paper-fig05.html" for "paper/fig05".
+    """Choose a file name for the page of each scene, such as "paper-fig05.html" for "paper/fig05".
 
-    All names are different, also where case is ignored.
+    All file names are different, also if upper and lower case are not distinguished.
 
     Parameters
     ----------
@@ -67,7 +72,7 @@ def page_names(scenes: Iterable[str]) -> dict[str, str]:
     Raises
     ------
     StoreError
-        For a name with a part ".." or ".": no file of this program has one.
+        If a name has a part ".." or "."; this program writes no such name.
     """
     names: dict[str, str] = {}
     taken = {f"{name}.html" for name in MAIN_PAGES}
@@ -76,7 +81,7 @@ def page_names(scenes: Iterable[str]) -> dict[str, str]:
             raise StoreError(
                 f"scene name {scene!r} cannot be made a file name; allowed: no part .. or ."
             )
-        # Only characters that every file system allows and that stay as they are in an address.
+        # Keep only characters that every file system allows and that need no encoding in a URL.
         stem = re.sub(r"[^A-Za-z0-9._-]+", "-", scene)[:_LONGEST].strip(".-") or "scene"
         stem = f"scene-{stem}" if stem.lower().startswith(_OTHERS) else stem
         name, number = f"{stem}.html", 2
@@ -88,24 +93,24 @@ def page_names(scenes: Iterable[str]) -> dict[str, str]:
 
 
 def write_pages(folder: Path, pages: Mapping[str, str]) -> None:
-    """Write each page whole or not at all; then remove pages of an earlier report.
+    """Write pages into a folder, each whole or not at all; then remove pages of earlier reports.
 
     Parameters
     ----------
-    folder : where they are written; it is made where it does not exist.
-    pages : HTML by file name. Pages in the folder that a report wrote and that are not among them
-        are removed.
+    folder : the folder, which is created if it does not exist.
+    pages : HTML of the pages by file name. Other pages in the folder that a report wrote are
+        removed.
 
     Raises
     ------
     StoreError
-        Where the folder cannot be written.
+        If the folder cannot be written.
     InputError
-        Where it has a file of one of these names that no report wrote.
+        If a file in the folder has the name of a page, but was not written by a report.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        for name in pages:  # all of them before the first is written
+        for name in pages:  # all names are checked before the first page is written
             refuse_foreign(folder / name, _MARK)
         for name, text in pages.items():
             content = _UNPRINTABLE.sub("\N{REPLACEMENT CHARACTER}", text).encode("utf-8")
@@ -122,22 +127,21 @@ def write_pages(folder: Path, pages: Mapping[str, str]) -> None:
 
 
 def render(page: PageContent, made: Pairs = (), links: Pairs = (), here: str = "") -> str:
-    """Return the HTML of a page: text, numbers of its plots, and the scripts that it needs.
+    """Return the HTML of a page: its text, the numbers of its plots, and the scripts that it needs.
 
-    Where the plots have more than MAX_NUMBERS numbers, the page is rendered again with fewer
-    samples.
+    If the plots have more than MAX_NUMBERS numbers, the page is rendered again with fewer samples.
 
     Parameters
     ----------
-    page : its content.
-    made : what made the results, see `runs.versions.made_with`.
-    links : (file, label) of the main pages.
-    here : the file of this page.
+    page : content of the page.
+    made : programs and machine that made the results, see `runs.versions.made_with`.
+    links : (file, label) of each page in the navigation.
+    here : file name of this page.
     """
     shown = []
     if any(file != here for file, _ in links):
         shown = [(file, label, file == here) for file, label in links]
-    # Rendering fills the store: how many numbers a page has is known only then.
+    # Rendering adds the curves to the store. Only then the number of numbers in them is known.
     template, store = _environment().get_template("page.html.j2"), CurveStore()
     known = {"page": page, "links": shown, "versions": made}
     html = template.render(known, store=store)
@@ -157,21 +161,21 @@ def write_page(
 
     Parameters
     ----------
-    folder : where it is written.
-    page : its content.
-    attributes : of the file that it shows, with what made that.
+    folder : the folder.
+    page : content of the page.
+    attributes : attributes of the file that the page shows; they name the programs that made it.
 
     Raises
     ------
     StoreError
-        Where the page cannot be written.
+        If the page cannot be written.
     """
     write_pages(Path(folder), {INDEX: render(page, made_with(attributes))})
     return Path(folder) / INDEX
 
 
 def script_json(data: object) -> Markup:
-    """Return JSON in which no character can end a script element or begin a comment."""
+    """Return data as JSON without characters that could end a script element or begin a comment."""
     text = json.dumps(data, separators=(",", ":"), ensure_ascii=True, allow_nan=False)
     for sign in "<>&":
         text = text.replace(sign, f"\\u{ord(sign):04x}")
@@ -180,7 +184,7 @@ def script_json(data: object) -> Markup:
 
 @cache
 def _script(name: str) -> str:
-    """Return a script without indentation and without lines that are comments."""
+    """Return the text of a script, without indentation, empty lines and lines of comments."""
     lines = (
         line.strip()
         for line in (_TEMPLATES / f"{name}.js").read_text(encoding="utf-8").splitlines()
@@ -190,7 +194,7 @@ def _script(name: str) -> str:
 
 @cache
 def _environment() -> jinja2.Environment:
-    """Build the environment of the pages' templates: filters, and what every page has."""
+    """Return the environment of the page template: filters, and values that every page uses."""
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(_TEMPLATES),
         autoescape=True,
@@ -199,7 +203,8 @@ def _environment() -> jinja2.Environment:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    # The policy allows these scripts and no others: nothing that a file's text might bring is run.
+    # The content security policy allows only these scripts, by their digests. A browser does not
+    # run a script that the text of a file might contain.
     digests = []
     for name in _SCRIPTS:
         digest = hashlib.sha256(_script(name).encode()).digest()
@@ -220,9 +225,9 @@ def _environment() -> jinja2.Environment:
 
 
 def _breakable(text: str) -> Markup:
-    """Return a name that a browser may break after a slash or an underscore.
+    """Return the HTML of a name, which a browser may break after a slash or an underscore.
 
-    A text with spaces is a sentence, and is typeset instead.
+    A text with spaces is taken for a sentence, and is typeset instead.
     """
     if " " in text:
         return escape(numbers.typeset(text))

@@ -1,4 +1,7 @@
-"""Read bounds of statuses and of `check`: reference/accuracy.toml, and a user's own file."""
+"""Read the bounds of checks from reference/accuracy.toml and from a user's own file.
+
+Statuses of runs and the command `check` use these bounds.
+"""
 
 from __future__ import annotations
 
@@ -29,14 +32,17 @@ _SENTENCE = keys.Kind(keys.read_text, "a sentence")
 
 @dataclass(frozen=True, slots=True)
 class Bound:
-    """Bound of a check: the largest value that passes, in the unit of the check.
+    """Declare the bound of a check: the largest value that passes, in the unit of the check.
 
     Attributes
     ----------
-    check, method : names; `*` in the name of a method matches any text.
-    value, reason : the bound, and why it has this value.
-    fault, known_fault : the value that a known fault causes, and the description of that fault.
-    scenes : shipped scenes to which it applies: patterns separated by `|`; `*` for any scene.
+    check, method : names of the check and of the method; `*` in the name of a method matches any
+        text.
+    value, reason : the bound, and the reason why it has this value.
+    fault, known_fault : a value of the check that a known fault causes, and a description of this
+        fault.
+    scenes : names of the shipped scenes to which the bound applies, as patterns separated by `|`;
+        `*` for any scene.
     """
 
     check: str = file_key("check", keys.choice(CHECKS))
@@ -54,21 +60,26 @@ _FILE = {"bound": file_key("bound", _BOUND_TABLES).metadata}
 
 @dataclass(frozen=True)
 class Bounds:
-    """Bounds of all checks of a scene: the first entry whose check, method and scene fit counts.
+    """Hold the bounds of all checks of a scene.
+
+    The first entry whose check, method and scene fit is used.
 
     Attributes
     ----------
-    entries : of one file or several, in the order in which they are tried.
-    scene : name of the shipped scene that they are for; "" for any other.
+    entries : bounds from one source or several, in the order in which they are tried.
+    scene : name of the shipped scene for which bounds are looked up; "" for any other scene.
     """
 
     entries: Sequence[Bound]
     scene: str = ""
 
     def of(self, check: str, method: str) -> Bound:
-        """Return the bound of a check of a method.
+        """Return the bound of a check for a method.
 
-        Raises InputError where there is none: a check without a bound would pass anything.
+        Raises
+        ------
+        InputError
+            If there is no bound, because a check without a bound would pass any value.
         """
         bound = self.find(check, method)
         if bound is None:
@@ -77,7 +88,7 @@ class Bounds:
         return bound
 
     def find(self, check: str, method: str) -> Bound | None:
-        """Return the bound of a check of a method, or None where there is none."""
+        """Return the bound of a check for a method, or None if there is no bound."""
         for bound in self.entries:
             if bound.check != check or not fnmatchcase(method, bound.method):
                 continue
@@ -86,20 +97,23 @@ class Bounds:
         return None
 
     def with_entries(self, entries: Iterable[Bound]) -> Bounds:
-        """Return bounds that try some entries first, then these."""
+        """Return bounds in which the given entries are tried before those of this object."""
         return replace(self, entries=[*entries, *self.entries])
 
 
 @functools.cache
 def shipped_bounds() -> Bounds:
-    """Return the bounds of reference/accuracy.toml, read once."""
+    """Return the bounds of reference/accuracy.toml, which is read only once."""
     return Bounds(read_bounds(REFERENCES / "accuracy.toml"))
 
 
 def read_bounds(path: Path) -> tuple[Bound, ...]:
-    """Return the entries of a TOML file of [[bound]] tables.
+    """Return the bounds of a TOML file, which has a table [[bound]] for each of them.
 
-    Raises InputError with every error of the file.
+    Raises
+    ------
+    InputError
+        If the file is not valid; the message has all errors of the file.
     """
     file = read_toml(path)
     file.refuse_other_kind("a file of bounds")
