@@ -221,7 +221,7 @@ def _status(
     bounds : bounds of the checks.
     """
     scene, trajectory, metrics = run.scene, run.trajectory, run.metrics
-    # Runs that did not reach the end, or whose engine reports a failure.
+    # First come runs that did not reach the end, or whose engine reports a failure.
     samples = len(trajectory.time)
     if samples != scene.samples or not integration.success:
         reached = (
@@ -250,8 +250,8 @@ def _status(
     if not is_corrected(run.method):
         return "completed", "", ""
 
-    # Complete runs of scenes that have no solution up to their end. The initial state is singular,
-    # or the run continued beyond the time at which the solution ends.
+    # The next runs are complete, but their scenes have no solution up to the end: the initial state
+    # is singular, or the run continued beyond the time at which the solution ends.
     if rotor_inertia_shares(scene, trajectory.angles[:1])[0] < NO_INERTIA:
         return "singular", "with all pitches at ±π/2 the initial mass matrix is singular", ""
     if (
@@ -277,7 +277,7 @@ def _status(
             )
             return "inaccurate", check.message, advice
 
-    # Complete runs that could only be judged in part.
+    # The next runs are complete, but can be judged only in part, or not at all.
     angle = float(np.abs(trajectory.angles).max())
     if angle > ANGLE_LIMIT:
         limit = f"above {ANGLE_LIMIT:.0e} rad double precision is not sufficient"

@@ -78,7 +78,7 @@ def write_report(
     if is_sweep(results):
         from rotor_mbs.report.pages.sweep import (
             sweep_page,
-        )  # late: most files need no such page
+        )  # imported only here, because most files need no such page
 
         sweep = StoredSweep(results)
         with reading(results), _without_warnings():
@@ -184,7 +184,7 @@ def pages_of(report: Report) -> list[Page]:
     if bench:
         pages.append(Page("bench.html", "Error and run time", partial(bench_page, report)))
     if modes:
-        from rotor_mbs.analysis.modes import read_modes  # late: most files have no modes
+        from rotor_mbs.analysis.modes import read_modes  # imported only if needed
         from rotor_mbs.report.pages.modes import modes_page
 
         pages.append(

@@ -28,7 +28,7 @@ from rotor_mbs.solution.quantities import (
     row_shape,
     scale_values,
 )
-from rotor_mbs.solution.quantities import Array as Array  # with the samples, for the models
+from rotor_mbs.solution.quantities import Array as Array  # models import it from this module
 from rotor_mbs.solution.quantities import arrays as all_arrays
 from rotor_mbs.solution.quantities import sample_times as sample_times
 from rotor_mbs.solution.status import OK_ERROR, comparison
@@ -48,7 +48,7 @@ class Trajectory:
     quantities : (n, ...) arrays by name. A name whose array is None is left out.
     """
 
-    # No other attribute can be set: an array must be in `quantities` to be found.
+    # Other attributes cannot be set. An array must be in `quantities`, where `get` looks it up.
     __slots__ = ("angles", "quantities", "rates", "refined", "time")
 
     def __init__(
