@@ -26,9 +26,10 @@ from rotor_mbs.solution.status import GOOD, STATUSES
 if TYPE_CHECKING:  # the runner is imported later, while the workers of a sweep load their code
     from rotor_mbs.runs.runner import RunOutcome
 
-# ANSI codes of the colours of statuses on a terminal: "ok" is green, and statuses of doubtful runs
-# are yellow. All other statuses have the colour _BAD, red.
-_COLOURS = {"ok": "32", "inaccurate": "33", "unchecked": "33"}
+# ANSI codes of the colours of statuses on a terminal: "ok" is green, and "completed" has the colour
+# of other text, as nothing is claimed of these runs. Statuses of doubtful runs, and of points of a
+# bench that were not run, are yellow. All other statuses have the colour _BAD, red.
+_COLOURS = {"ok": "32", "completed": "39", "inaccurate": "33", "unchecked": "33", "left_out": "33"}
 _BAD = "31"
 # Shortest time in s between two lines of a stage: on a terminal or in a notebook, and in a log.
 _RENEWED_S, _LOGGED_S = 0.1, 10.0

@@ -23,7 +23,7 @@ from support.sweeps import THREE_RUNS
 
 from rotor_mbs.analysis.text_tables import table_of_runs
 from rotor_mbs.errors import MethodRefusal
-from rotor_mbs.runs.progress import ProgressLine
+from rotor_mbs.runs.progress import ProgressLine, coloured
 from rotor_mbs.runs.read import open_results
 from rotor_mbs.runs.runner import RunOutcome
 from rotor_mbs.runs.sweeps import StoredSweep
@@ -59,6 +59,8 @@ def test_a_terminal_shows_the_share_of_the_work(monkeypatch: pytest.MonkeyPatch)
         progress(2, 100, outcome(status="diverged", message="x" * 200))
     assert "x" * 200 in screen.getvalue()
     assert "\x1b[31mdiverged\x1b[0m" in screen.getvalue()
+    # of a completed run nothing is claimed: neither a success nor a failure
+    assert coloured("ok, completed", screen) == "\x1b[32mok\x1b[0m, \x1b[39mcompleted\x1b[0m"
 
 
 def _ends_by(patch: pytest.MonkeyPatch, action: Callable[[], object]) -> tuple[int, str]:

@@ -135,22 +135,23 @@ def test_a_derivative_that_is_not_finite_ends_a_run_at_its_start_alone() -> None
     assert at_start.message == "SciPy: the derivative of the state is not finite"
     assert (at_start.steps, at_start.evaluations, len(at_start.states)) == (0, 0, 0)
     assert at_start.end.tolist() == [1.0]
-    # The slope is not defined beyond 1, and the first trial steps are 100 times as long.
+    # The slope is not defined beyond 0.001; the second evaluation, before the first step, is at
+    # 0.01 of the state over its slope.
     tried = []
 
     def bounded(time: float, _state: Any) -> list[float]:
         tried.append(time)
-        return [1.0 if time <= 1.0 else math.nan]
+        return [1.0 if time <= 0.001 else math.nan]
 
-    later = INTEGRATORS["DOP853"](bounded, 0.0, 100.0, np.ones(1), np.array([0.5]))
-    assert max(tried) > 1.0
-    assert later.end[0] == pytest.approx(2.0, abs=1e-6)
+    later = INTEGRATORS["DOP853"](bounded, 0.0, 100.0, np.ones(1), np.array([0.0005]))
+    assert tried[:2] == [0.0, 0.01]
     assert "step size" in later.message
+    assert later.end[0] == pytest.approx(1.001, abs=1e-6)
+    assert later.states[:, 0] == pytest.approx([1.0005], abs=1e-9)
 
 
 def test_one_step_may_not_evaluate_without_end(monkeypatch: pytest.MonkeyPatch) -> None:
     """Evaluations of a step are counted anew in each."""
-    monkeypatch.setattr(ode_solvers, "_MAX_STEP_EVALUATIONS", 12)
     calls = []
 
     def oscillation(time: float, state: Any) -> list[float]:
@@ -158,12 +159,13 @@ def test_one_step_may_not_evaluate_without_end(monkeypatch: pytest.MonkeyPatch) 
         return [state[1], -state[0]]
 
     start = np.array([1.0, 0.0])
-    # DOP853: two evaluations before the first step, eleven in each that is taken at once.
+    # DOP853: two evaluations before the first step, some twelve in each that is taken at once.
+    monkeypatch.setattr(ode_solvers, "MAX_STEP_EVALUATIONS", 12)
     ended = INTEGRATORS["DOP853"](oscillation, 0.0, 0.1, start, np.empty(0))
     assert not ended.message
     assert len(calls) > 12
-    monkeypatch.setattr(ode_solvers, "_MAX_STEP_EVALUATIONS", 10)
     calls.clear()
+    monkeypatch.setattr(ode_solvers, "MAX_STEP_EVALUATIONS", 10)
     ended = INTEGRATORS["DOP853"](oscillation, 0.0, 0.1, start, np.empty(0))
     assert ended.message == "SciPy: no step is small enough"
     assert len(calls) == 2 + 10
@@ -184,10 +186,11 @@ def test_a_run_ends_as_soon_as_it_would_take_ten_times_the_steps_that_are_allowe
     step = 100.0 / (len(alone.t) - 1)
     limited = scipy_integrator("RK23", 1e-3, 1e-6, max_steps=5000)
     # The estimate is of the share of the interval that is crossed, wherever it begins.
-    ended = limited(oscillation, 7.0, 7.0 + times_as_many * 5000 * step, start, nothing)
+    begin = 10.0 * 5000 * step
+    ended = limited(oscillation, begin, begin + times_as_many * 5000 * step, start, nothing)
     assert ended.message == "SciPy: more than 5000 steps"
     assert ended.steps == steps
-    enough = limited(oscillation, 7.0, 7.0 + 500 * step, start, nothing)
+    enough = limited(oscillation, begin, begin + 500 * step, start, nothing)
     assert not enough.message
 
 

@@ -156,7 +156,7 @@ EXPLAINED = {
         "keeps rounding from putting a sample past the end of its interval, in runs of thousands "
         "of intervals"
     ),
-    r"ode_solvers\.(_MAX_STEP_EVALUATIONS|_OUTLOOK_STEPS) .*000 -> \d+1$": (
+    r"ode_solvers\.(MAX_STEP_EVALUATIONS|_OUTLOOK_STEPS) .*000 -> \d+1$": (
         "a limit that one more or one less does not miss"
     ),
     r"taylor\.__init__ .*keep is not None turned": (

@@ -140,7 +140,7 @@ def work_unit(scene: Scene) -> float:
 # Evaluations within one step, however often it is tried. SciPy shortens a step up to 460 times,
 # where it begins at 0, with 12 evaluations each. More are an endless loop, as where the slope
 # overflows and the first step is not a number.
-_MAX_STEP_EVALUATIONS = 100_000
+MAX_STEP_EVALUATIONS = 100_000
 # After so many steps their number for the whole interval is estimated; the run ends if the estimate
 # is above the allowed number by this factor.
 _OUTLOOK_STEPS = 2_000
@@ -181,7 +181,7 @@ def scipy_integrator(
             nonlocal in_step
             raise_if_over()  # here, because one step may try ever smaller sizes
             in_step += 1
-            if in_step > _MAX_STEP_EVALUATIONS:
+            if in_step > MAX_STEP_EVALUATIONS:
                 raise ValueError("no step is small enough")
             slope = function(time, values)
             # Only the derivative at the start is checked here.
