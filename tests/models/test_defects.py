@@ -13,14 +13,20 @@ import numpy as np
 import pytest
 from support.defects import made_defects
 from support.references import reference
-from support.scenes import PAPER_SCENES, paper, shipped
+from support.scenes import AXIAL, PAPER_SCENES, make_scene, paper, shipped
 
 from rotor_mbs.analysis.judgement import judge
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.lagrange import closed_form
 from rotor_mbs.models.lagrange import defects as defects_module
-from rotor_mbs.models.lagrange.defects import fitted_rates, interval_defects, interval_ends
+from rotor_mbs.models.lagrange.defects import (
+    FIT_ROWS,
+    fitted_rates,
+    interval_defects,
+    interval_ends,
+    rates_of_change,
+)
 from rotor_mbs.models.lagrange.hamilton import resting_pitches
 from rotor_mbs.models.lagrange.heyoka_adapter import is_available
 from rotor_mbs.models.lagrange.parameters import rate_units
@@ -630,6 +636,106 @@ def test_what_is_worked_on_block_by_block_is_as_of_all_at_once(
     assert parts.mean == whole.mean
     assert np.array_equal(parts.excess, whole.excess)
     assert np.array_equal(parts.sizes, whole.sizes)
+
+
+# ---- Rounding, units and rates of data
+
+# Without gravity, on a shaft about which nothing but a torque turns.
+INERTIA = 3.0 * AXIAL.inertia_about_apex()[1]
+
+
+def balanced(table: tuple[tuple[float, float], ...] = (), **changes: Any) -> Scene:
+    scene = make_scene(
+        [1.0, 0, 0, 0], [4.0, 0, 0, 0], (AXIAL,) * 3, gravity=0.0, duration=8.0, **changes
+    )
+    return replace(scene, rotor_torque=table)
+
+
+def test_a_row_is_rounded_in_its_numbers_and_in_its_time() -> None:
+    """Half a unit in the last place of each, of time by the rate of change at the row: the rotor
+    turns at 4 rad/s under 600 N m."""
+    scene = balanced(((0.0, 600.0),))
+    time = np.array([0.5, 0.75, 1.25])
+    angles, rates = np.tile([1.0, 0, 0, 0], (3, 1)), np.tile([4.0, 0, 0, 0], (3, 1))
+    unit = 2.0**-53
+    defects = interval_defects(scene, time, angles, rates)
+    assert defects.rounding[:, 0] == pytest.approx(unit * (1.0 + 4.0 * time), rel=1e-12)
+    at_rates = unit * (4.0 + 600.0 / INERTIA * time)
+    assert defects.rounding[:, 4] == pytest.approx(at_rates, rel=1e-12)
+    given, of_times = np.full((3, 8), 1e-4), np.array([1e-5, 2e-5, 3e-5])
+    defects = interval_defects(scene, time, angles, rates, given, of_times)
+    assert defects.rounding[:, 0] == pytest.approx(1e-4 + 4.0 * of_times, rel=1e-12)
+    assert defects.rounding[:, 1] == pytest.approx(1e-4, rel=1e-12)
+
+
+def test_at_a_jump_of_a_load_the_larger_rate_of_change_counts() -> None:
+    time, states = np.array([1.0, 2.0, 3.0]), np.tile([1.0, 0, 0, 0, 4.0, 0, 0, 0], (3, 1))
+    scene = balanced(((1.0, 0.0), (1.0, 600.0), (2.0, 600.0), (2.0, 0.0)))
+    changes = rates_of_change(scene, time, states)
+    assert changes[:, 0] == pytest.approx(4.0, rel=1e-12)
+    assert changes[:, 4] == pytest.approx([600.0 / INERTIA, 600.0 / INERTIA, 0.0], rel=1e-12)
+
+
+@pytest.mark.parametrize(("rows", "interval"), [(2, 1e-3), (3, 1e-3), (3, 2.0)])
+def test_rates_count_in_units_of_at_least_the_inverse_of_an_interval(
+    rows: int, interval: float
+) -> None:
+    """A fixed pitch in 1 rad/s, as the moving coordinates of a rotor that turns slowly."""
+    fixed = replace(AXIAL, inertia=(0.0,) * 6)
+    scene = replace(balanced(), blades=(fixed, AXIAL, AXIAL))
+    time = interval * np.arange(rows)
+    angles, rates = np.tile([1.0, 0, 0, 0], (rows, 1)), np.tile([0.1, 0, 0, 0], (rows, 1))
+    defects = interval_defects(scene, time, angles, rates)
+    expected = np.maximum([1.0] * 4, 1.0 / interval)
+    assert defects.rate_units == pytest.approx(expected, rel=1e-12)
+    assert defects.precision == (2.0**-52 if is_available() else 2.3e-14)
+
+
+def test_the_conditioning_of_an_interval_is_that_of_its_more_singular_end() -> None:
+    """1/√(share of the rotor's inertia that is left): a single blade, J = A - B²/Jzz of A."""
+    blade = replace(AXIAL, centre_of_mass=(0.0, 1.0, 3.0))
+    scene = make_scene([0.0, 0.5], [0.0, 0.0], (blade,), hub_inertia=10.0)
+    angles = np.array([[0.0, 0.5], [0.0, 0.7], [0.0, 0.9]])
+    defects = interval_defects(scene, np.array([0.0, 0.1, 0.2]), angles, np.zeros((3, 2)))
+    xx, yy, zz, _, xz, yz = blade.inertia_about_apex()
+    shares = []
+    for pitch in angles[:, 1]:
+        s, c = np.sin(pitch), np.cos(pitch)
+        about_shaft = 10.0 + xx * s * s + yy * c * c
+        shares.append(1.0 - (xz * s + yz * c) ** 2 / (zz * about_shaft))
+    assert shares == sorted(shares)  # so the first end of each interval is the more singular one
+    assert defects.conditioning == pytest.approx(1.0 / np.sqrt(shares[:-1]), rel=1e-12)
+
+
+def test_a_fitted_rate_changes_with_an_angle_as_its_sensitivity_says() -> None:
+    run, half = fig11_run(), len(FIG11.moving_coordinates)
+    rows, size = slice(0, 21), 1e-7
+    time, angles = run.time[rows], run.angles[rows]
+    fitted = fitted_rates(FIG11, time, angles)
+    for place in range(FIT_ROWS):
+        moved = angles.copy()
+        moved[fitted.windows[10] + place, 0] += size
+        change = fitted_rates(FIG11, time, moved).rates[10] - fitted.rates[10]
+        expected = size * fitted.sensitivity[10, :, place * half]
+        np.testing.assert_allclose(change[FIG11.moving_coordinates], expected, rtol=1e-3, atol=1e-9)
+
+
+def test_an_interval_over_many_jumps_of_a_torque_has_each() -> None:
+    """1 s of each torque in turn, in one interval; and further intervals behind it."""
+    torques = [300.0, -600.0, 900.0, 100.0, -200.0]
+    table = [
+        (float(second + end), torque) for second, torque in enumerate(torques) for end in (0, 1)
+    ]
+    scene = balanced(tuple(table))
+    rate, angle = 4.0, 1.0
+    for torque in torques[:4]:
+        angle += rate + 0.5 * torque / INERTIA
+        rate += torque / INERTIA
+    state = np.array([[1.0, 0, 0, 0, 4.0, 0, 0, 0], [angle, 0, 0, 0, rate, 0, 0, 0]])
+    ends = interval_ends(scene, np.array([0.0, 4.0]), np.array([4.0, 5.0]), state)
+    assert ends[0] == pytest.approx(state[1], rel=1e-12, abs=1e-12)
+    last = rate + torques[4] / INERTIA
+    assert ends[1, 4] == pytest.approx(last, rel=1e-12)
 
 
 # ---- Transition matrices

@@ -127,6 +127,24 @@ EXPLAINED = {
     r"lagrange\.defects\._(DOP853|RADIANS_PER_STEP|ROUGH_END) ": (
         "half as much again is within the accuracy that is asked of the matrices, or of a defect"
     ),
+    r"lagrange\.defects\._(FIT_ROUNDS|STANDS_STILL|NEAR) |fitted_rates .*(277:18|285:)": (
+        "where the rounds of a fit end: half as much again, or a round more, does as well"
+    ),
+    r"lagrange\.defects\._(SIDE|SMALLEST_SHARE|DIFFERENCE|SMALL_DIFFERENCE|SMALL_AT_END) ": (
+        "the size of a difference or of a share near zero: half as much again does as well"
+    ),
+    r"fitted_rates .*1\.0 / step scaled": "a unit of the rates, of which a fit is independent",
+    r"fitted_rates .*and, or in np\.isfinite": (
+        "both hold the same matrices: where one is not finite, neither is the other"
+    ),
+    r"interval_ends .*(325:14 right|330:52 right)": "whole numbers are compared",
+    r"interval_ends .*(327:|332:|333:|337:|338:)": (
+        "bounds the work on rows that are no motion, which are NaN in any case"
+    ),
+    r"_advance_by_taylor .*(len\(state\) > count turned|if has_work|0\.0 -> )": (
+        "the work is no part of a defect, wherever it begins"
+    ),
+    r"_advance_by_dop853 .*0 -> 1": "SciPy counts its evaluations: there is no other case",
     r"defects\.KEPT_ROWS ": "decides how much memory a run takes, not what comes out",
     r"judgement\.smallest_rotor_inertia_share .*65 -> 66": (
         "points of a search along the way to the next sample"
