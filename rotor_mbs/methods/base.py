@@ -134,7 +134,10 @@ class Solver(Protocol):
         """
 
     def observe(self) -> Trajectory:
-        """Return the samples of the last integration before the first that is not finite."""
+        """Return the samples of the last integration, up to the first that is not finite.
+
+        That sample is excluded.
+        """
 
 
 def checked_result(value: Any, kind: type, name: str, function: object, method: str) -> Any:
@@ -255,8 +258,9 @@ class Method:
     arrays : names of optional quantities that the method stores, such as "constraint_error".
     sources : source files of a method of another package, or the text of a method file. A digest
         of them is stored with each run.
-    import_engine : () -> None, called before a timing. It imports the packages that the method
-        needs. It also switches off caches of code that earlier processes have compiled.
+    import_engine : () -> None, called by `bench` before its first timing. It imports the packages
+        that the method needs. If the engine keeps compiled code on the disk, it must not use this
+        code, so that a cold start is timed.
     """
 
     name: str
@@ -336,8 +340,8 @@ class Method:
         interval : s, time between samples.
         """
         for ladder in self.ladders:
-            # The ladder of a variant has other choices, so its settings are not those of the run,
-            # made finer.
+            # The ladder of a variant has other choices than the run: none of its points is a finer
+            # version of the run.
             if ladder.variant:
                 continue
             for number in ladder.settings_by_value(interval):
@@ -369,5 +373,8 @@ def _is_distribution_installed(distribution: str) -> bool:
 
 
 def lazy(place: str) -> Callable[..., Any]:
-    """Return a function that imports the one at "package.module:name" when it is called."""
+    """Return a function that imports and calls the function at "package.module:name".
+
+    The import takes place when the returned function is called; the arguments are passed on.
+    """
     return lambda *arguments: resolve_name(place)(*arguments)

@@ -1,8 +1,8 @@
 """Decide which methods run a scene, and with which settings.
 
-Methods that are named run if they can represent the scene. If no method is named, a rule selects
-methods. The rule was derived from results of the stability suite, which shows the scenes on which
-methods fail or take minutes.
+If the user or the scene's file names methods, those that can represent the scene are run. If no
+method is named, a rule selects methods. The rule was derived from results of the stability suite,
+which shows the scenes on which methods fail or take minutes.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from rotor_mbs.methods.catalogue import (
 from rotor_mbs.methods.settings import unknown_setting
 from rotor_mbs.scenario.toml_file import KeyProblem
 
-if TYPE_CHECKING:  # `rotor-mbs list` reads no scene
+if TYPE_CHECKING:  # the command `list` imports this module, and needs no scene
     from rotor_mbs.scenario.scene import Scene
 
 
@@ -137,8 +137,9 @@ class Refusal:
     scene : name of the scene.
     method : name of the method; "" if no method was selected for the scene.
     reason : why the run is left out, in one sentence.
-    is_asked : whether the user asked for the run. False if a rule selected the method, unless the
-        run is refused for its settings, and the call or the scene's file sets some of them.
+    is_asked : whether the user asked for the run. A run whose method was selected by a rule counts
+        as asked for only if it is refused for its settings, and the call or the scene's file gives
+        settings of this method.
     """
 
     scene: str
@@ -376,7 +377,8 @@ def fastest_rates(scene: Scene) -> tuple[float, float]:
 def singular_reason(scene: Scene) -> str:
     """Return why the mass matrix of a scene is or must become singular; "" if it does not.
 
-    Only a rotor with point-mass blades and a hub without inertia can have a singular mass matrix.
+    Only a rotor whose hub has no inertia can have a singular mass matrix. Rotors with point-mass
+    blades are recognized; rotors with thin rods that point at the apex are not.
 
     Parameters
     ----------

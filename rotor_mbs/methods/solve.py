@@ -84,7 +84,8 @@ def solve(
                     integration = solver.integrate()
                     run_times.append(time.perf_counter() - start)
                     _check_report(method, solver, integration)
-                    if integration.out_of_time:  # nothing would limit a further integration
+                    # The time limit interrupts only once: a further integration would have none.
+                    if integration.out_of_time:
                         break
         finally:
             if gc_was_on:

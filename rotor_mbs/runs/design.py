@@ -59,8 +59,8 @@ def flags(names: Sequence[str], first: int = 0) -> dict[str, Any]:
     }
 
 
-# Computed values of a row whose columns precede those of the metrics, in the order of the columns.
-# Each value has the names of the tables that store it.
+# Computed columns of rows that precede those of the metrics, in the order of the file. Each has the
+# names of the tables that store it.
 _OUTCOME_VALUES = {
     "status": RowValue(
         "1",
@@ -76,7 +76,7 @@ _OUTCOME_VALUES = {
     ),
     "samples": RowValue("1", "number of samples stored", "runs bench", "<i8"),
     "time_reached": RowValue(
-        "s", "time of the run's last sample; 0 also without any", "runs sweep"
+        "s", "time of the run's last sample; 0 if the run has no sample", "runs sweep"
     ),
     "time_limit_s": RowValue(
         "s", "time limit that stopped the run; NaN if it was not stopped", "runs sweep"
@@ -123,7 +123,7 @@ _OUTCOME_VALUES = {
         "s", "largest step of the ladder with an error of at most 1e-6 rad", "stability"
     ),
 }
-# Computed values of a row whose columns follow those of the metrics. The checksum is the last.
+# Computed columns of rows that follow those of the metrics. The checksum is the last.
 _CHECKSUM_VALUES = {
     "code": RowValue(
         "1",
@@ -133,7 +133,7 @@ _CHECKSUM_VALUES = {
     ),
     "crc32": RowValue(
         "1",
-        "CRC-32 of the row over what is computed; not of what is known before",
+        "CRC-32 over the computed columns of the row; the known columns are not covered",
         "bench stability sweep",
         "<u4",
     ),
@@ -314,7 +314,9 @@ def known_columns(rows: Sequence[Mapping[str, object]]) -> dict[str, tuple[Colum
 
 
 def scene_scales(scene: Scene, columns: Iterable[Column]) -> dict[str, tuple[Column, Any]]:
-    """Return the scales of a table of a scene's samples, which are part of its known columns.
+    """Return the dimension scales (time, coordinate, ...) of the table of a scene's arrays.
+
+    They are stored among the known columns of the table.
 
     Parameters
     ----------

@@ -9,8 +9,8 @@ from __future__ import annotations
 import math
 import os
 import zlib
-from collections.abc import Collection, Mapping
-from contextlib import nullcontext
+from collections.abc import Collection, Iterator, Mapping
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import IO, Any
@@ -36,8 +36,8 @@ class RowLocation:
     Attributes
     ----------
     path : the file.
-    inode : inode of the file. A file that has replaced it under its name is not written to.
-    first : number of the first row, with which the checksum of that row begins.
+    inode : inode of the file. If another file has this path now, nothing is written to it.
+    first : number of the first row, which is the initial value of its checksum.
     offsets : for each column, bytes from the beginning of the file to the value of the first row.
     row_type : type of a row; its columns are in the order in which the checksum covers them.
     """
@@ -105,9 +105,7 @@ class RowLocation:
             for name in (STATUS_COPIES["status"], "status")
             if name in columns
         }
-        with store_errors(self.path), self.path.open("r+b") as file:
-            if os.fstat(file.fileno()).st_ino != self.inode:
-                raise StoreError(f"{self.path}: has been replaced by another file")
+        with self._open_to_write() as file:
             # The rows are missing until all columns are written: a reader must not take a part of a
             # row for the whole row.
             for name, status in statuses.items():
@@ -122,6 +120,17 @@ class RowLocation:
             for name, status in statuses.items():
                 file.seek(self.offsets[name])
                 file.write(np.ascontiguousarray(status, np.int8).data)
+
+    @contextmanager
+    def _open_to_write(self) -> Iterator[IO[bytes]]:
+        """Open the file, and close it after the block.
+
+        Raises StoreError if the file has been replaced, and for an error of the block.
+        """
+        with store_errors(self.path), self.path.open("r+b") as file:
+            if os.fstat(file.fileno()).st_ino != self.inode:
+                raise StoreError(f"{self.path}: has been replaced by another file")
+            yield file
 
     def read(self, count: int = 1, file: IO[bytes] | None = None) -> Rows:
         """Read the columns of the first `count` rows, each (count, ...), without verifying them.
@@ -163,9 +172,9 @@ class RowLocation:
         Raises
         ------
         StoreError
-            If the file cannot be written.
+            If the file cannot be written, or has been replaced.
         """
-        with store_errors(self.path), self.path.open("r+b") as file:
+        with self._open_to_write() as file:
             for row in rows:
                 for name in ("status", STATUS_COPIES["status"]):
                     if name in self.offsets:

@@ -1,7 +1,8 @@
 """Compute rows of a table: send tasks to worker processes, and write their rows to the file.
 
-For each run the parent process calls `run_tasks_references_first`, `run_tasks`, `pool.run_in` and
-`TaskPool.submit`; the worker process then calls `run_in_worker` and `RunTask.perform`.
+In the parent process `run_tasks_references_first` calls `run_tasks`, which calls `pool.run_in`,
+which calls `TaskPool.submit` for each task. In the worker process `run_in_worker` calls
+`RunTask.perform`.
 """
 
 from __future__ import annotations
@@ -99,7 +100,7 @@ class Task(ABC):
 
     @property
     def first(self) -> int:
-        """Return the number of the first row, with which the checksum of that row begins."""
+        """Return the number of the first row, which is the initial value of its checksum."""
         return self.place.first
 
     @abstractmethod

@@ -49,8 +49,8 @@ from rotor_mbs.runs.trailer import RESULTS, SWEEP, Regions, Trailer
 # Name of the attribute of a sweep's file that has a hash of its whole design.
 IDENTITY = "sweep_identity"
 _READ_BYTES = 1 << 25  # bytes that are read at once when checksums are verified
-# Longest label of a run, in characters. A longer label is damaged: a scene has the name of a file,
-# which is shorter.
+# Longest label of a run, in characters. A longer label can only come from a damaged file: a scene
+# is named after its file, and file systems limit the length of names.
 _LONGEST_LABEL = 1000
 T = TypeVar("T")
 

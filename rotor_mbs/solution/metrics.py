@@ -55,10 +55,10 @@ class RowValue:
     is_main: bool = False
 
 
-_OWN_POINTS = "of printed/ode45 over ode45's own output points instead"
+_OWN_POINTS = "for printed/ode45: over ode45's own output points"
 _ALL, _BENCH = "runs bench stability", "runs bench"  # see `RowValue.tables`
-# All metrics in the order of their columns, without those that `Quantity.judgement` declares for
-# the table of runs.
+# Metrics in the order of their columns. Those that a quantity declares for the table of runs
+# (`Quantity.judgement`, `Quantity.has_peak`) are added by `runs.design.metric_columns`.
 METRICS = {
     "energy_scale_J": RowValue("J", "energy scale, to which energy errors are relative"),
     "energy_drift_max": RowValue(
@@ -100,7 +100,7 @@ METRICS = {
     ),
     "defect_time": RowValue(
         "s",
-        "end of the interval that is furthest beyond its bound, or of the largest defect",
+        "end of the interval that is furthest beyond its bound; if none is, of the largest defect",
         "runs sweep",
     ),
     "defect_judged": RowValue(
@@ -109,25 +109,27 @@ METRICS = {
         "above 1, and by the error growth over the interval, if above 1; largest over the run",
         rounding=1.0,
     ),
-    "defect_excess": RowValue("rad", "defect beyond rounding in that interval", rounding=1.0),
+    "defect_excess": RowValue(
+        "rad", "defect beyond rounding in the interval at defect_time", rounding=1.0
+    ),
     "defect_allowed": RowValue(
-        "rad", "largest defect beyond rounding that is allowed in that interval"
+        "rad", "largest defect beyond rounding that is allowed in the interval at defect_time"
     ),
     "defect_mean": RowValue(
-        "rad", "largest signed mean of the defects of a coordinate", rounding=1.0
+        "rad", "largest magnitude of the mean defect of a coordinate", rounding=1.0
     ),
     "defect_drift": RowValue(
         "rad",
-        "largest sum of the defects of 100 consecutive intervals, each multiplied by the state "
-        "transition matrix from its interval to the last of the 100",
+        "largest sum of the defects of up to 100 consecutive intervals, each multiplied by the "
+        "state transition matrix from its interval to the last of them",
         rounding=DRIFT_ROWS,
     ),
     "defect_floor": RowValue("rad", "largest defect that rounding of the samples can cause"),
     "defects_not_judged": RowValue(
         "1",
         (
-            "number of intervals with a defect of more than 0.01 rad, beyond rounding or because "
-            "of it"
+            "number of intervals with a defect beyond rounding of more than 0.01 rad, or in which "
+            "rounding alone may cause as much"
         ),
     ),
     "zero_pitch_max": RowValue(
@@ -163,8 +165,8 @@ METRICS = {
     "pitch_max": RowValue("rad", "largest magnitude of a pitch angle", "sweep", is_main=True),
 }
 
-# Largest angle that can be judged, rad. The last digit of a larger double is above 1e-10 rad, so
-# that neither its sine nor an error of 1e-9 rad is meaningful.
+# Largest angle that can be judged, rad. Larger doubles are more than 1e-10 rad apart: errors of
+# 1e-9 rad are hardly resolved.
 ANGLE_LIMIT = 1e6
 
 # A pitch angle that leaves zero grows exponentially while its magnitude is between these limits,
@@ -256,8 +258,8 @@ def metrics_of(
     scene, run : the scene and the samples of the run. A run without samples has no metrics.
     reference : samples of the scene's reference; None if it has none.
     defects : interval defects of the run; None if they are not computed.
-    is_corrected : whether the run claims the corrected equations, which the defects are computed
-        by. Only then the sum of the defects predicts the error of the run.
+    is_corrected : whether the method of the run solves the corrected equations. The defects are
+        computed with these equations: only then their sum predicts the error of the run.
     """
     metrics: Metrics = {}
     if not len(run.time):

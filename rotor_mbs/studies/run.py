@@ -43,8 +43,8 @@ from rotor_mbs.solution.status import STATUSES
 from rotor_mbs.solution.trajectory import Integration, Solution, Trajectory
 from rotor_mbs.studies.stored_references import frozen_solution, read_reference, shipped_versions
 
-# A short run is repeated up to _REPEATS times within _REPEAT_BUDGET_S (s), so that its median time
-# is not that of a cold cache. A run that takes more than half this budget is not repeated.
+# A short run is integrated up to _REPEATS times, as long as all integrations together take at most
+# _REPEAT_BUDGET_S (s). Its median time is then not that of a cold cache.
 _REPEATS = 5
 _REPEAT_BUDGET_S = 0.05
 _JUDGING_S = 1.0  # time in s that judging a run may always take, even after its time limit
@@ -110,7 +110,10 @@ class RunTask(Task):
         if self.reference is not None:
             reference = read_reference(self.reference, request.scene)
         run, false_success = _judged(run, reference, end)
-        limit = self.time_limit_s if run.status == "timed_out" and shipped is None else np.nan
+        # A shipped reference that was stopped before it was shipped has no time limit of this call.
+        was_stopped_before = shipped is not None and shipped.integration.out_of_time
+        is_over = run.status == "timed_out" and not was_stopped_before
+        limit = self.time_limit_s if is_over else np.nan
         return row_of_run(
             run, self.place, {"false_success": int(false_success), "time_limit_s": limit}
         )
@@ -252,10 +255,10 @@ def missing_runs(
         row = place.read()
         status = STATUSES[row["status"][0]] if place.is_stored else ""
         # `limit` is the time limit that ended the stored run, or NaN. A run with the status
-        # timed_out is computed again unless `limit` is at least the present time limit. A row with
-        # a shipped reference has a `limit` only if the reference took too long to read. If its
-        # computation was ended early before it was shipped, the status is timed_out, too, but
-        # `limit` is NaN. It is then not read again, as it would end at the same sample.
+        # timed_out is computed again unless `limit` is at least the present time limit. A shipped
+        # reference may itself end early, because its computation was stopped before it was shipped.
+        # Its row then has the status timed_out and `limit` NaN. Such a reference is not read again:
+        # it would end at the same sample.
         limit = row["time_limit_s"][0]
         is_short = not limit >= timeout_s
         if run.is_shipped:
@@ -349,9 +352,10 @@ def solve_judged(
 
 
 def _judged(run: Solution, reference: Trajectory | None, end: float) -> tuple[Solution, bool]:
-    """Judge a run: return it with status, message and metrics, and whether its success is false.
+    """Judge a run.
 
-    A success is false if the engine reports it although the samples are wrong.
+    Return the run with status, message and metrics, and whether the engine reported success
+    although the samples are wrong.
 
     Parameters
     ----------
@@ -418,7 +422,7 @@ def next_to_try(scene: Scene, method: str, settings: Mapping[str, object], statu
 def without_samples(
     scene: Scene, method: str, settings: Mapping[str, object], status: str, message: str
 ) -> Solution:
-    """Return a run that has no samples, and an engine's report of failure.
+    """Return a run without samples, whose engine report says that it failed.
 
     Parameters
     ----------

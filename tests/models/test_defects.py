@@ -659,13 +659,13 @@ def test_a_row_is_rounded_in_its_numbers_and_in_its_time() -> None:
     angles, rates = np.tile([1.0, 0, 0, 0], (3, 1)), np.tile([4.0, 0, 0, 0], (3, 1))
     unit = 2.0**-53
     defects = interval_defects(scene, time, angles, rates)
-    assert defects.rounding[:, 0] == pytest.approx(unit * (1.0 + 4.0 * time), rel=1e-12)
+    assert defects.rounding[:, 0] == pytest.approx(unit * (1.0 + 4.0 * time), rel=1e-12, abs=0.0)
     at_rates = unit * (4.0 + 600.0 / INERTIA * time)
-    assert defects.rounding[:, 4] == pytest.approx(at_rates, rel=1e-12)
+    assert defects.rounding[:, 4] == pytest.approx(at_rates, rel=1e-12, abs=0.0)
     given, of_times = np.full((3, 8), 1e-4), np.array([1e-5, 2e-5, 3e-5])
     defects = interval_defects(scene, time, angles, rates, given, of_times)
-    assert defects.rounding[:, 0] == pytest.approx(1e-4 + 4.0 * of_times, rel=1e-12)
-    assert defects.rounding[:, 1] == pytest.approx(1e-4, rel=1e-12)
+    assert defects.rounding[:, 0] == pytest.approx(1e-4 + 4.0 * of_times, rel=1e-12, abs=0.0)
+    assert defects.rounding[:, 1] == pytest.approx(1e-4, rel=1e-12, abs=0.0)
 
 
 def test_at_a_jump_of_a_load_the_larger_rate_of_change_counts() -> None:

@@ -20,6 +20,7 @@ import rotor_mbs as rm
 from rotor_mbs.analysis.text_tables import run_row
 from rotor_mbs.errors import StoreError
 from rotor_mbs.methods.catalogue import find_method
+from rotor_mbs.methods.time_limit import OutOfTimeError
 from rotor_mbs.models.lagrange.defects import interval_defects
 from rotor_mbs.processes.pool import SerialPool
 from rotor_mbs.runs.read import open_results
@@ -242,6 +243,19 @@ def test_a_shipped_reference_that_was_not_read_in_time_is_read_again(tmp_path: P
         METHODS[0],
     ]
     assert made(run(tmp_path / "r.h5", METHODS[:1], timeout_s=7.0)) == []
+
+
+def test_a_shipped_reference_that_was_not_judged_in_time_is_judged_again(tmp_path: Path) -> None:
+    scene, path = find_scenes(["paper/fig08"])[0], tmp_path / "r.h5"
+
+    def references(timeout_s: float) -> list[tuple[str, str]]:
+        ended = run_scenes([scene], {scene.name: ()}, path, workers=0, timeout_s=timeout_s)
+        return [(run.method, run.status) for run in ended if run.is_computed]
+
+    with patch("rotor_mbs.studies.run.judge", side_effect=OutOfTimeError("over the time limit")):
+        assert references(5.0) == [("reference", "timed_out")]
+    assert references(4.0) == []
+    assert references(6.0) == [("reference", "ok")]
 
 
 # Versions

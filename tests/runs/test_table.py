@@ -114,8 +114,9 @@ def test_a_worker_of_an_earlier_file_does_not_write_to_its_successor(path: Path)
     with create_file(path, [_table()], {"title": "t"}):
         pass
     before = path.read_bytes()
-    with pytest.raises(StoreError, match="has been replaced by another file"):
-        place.write(_rows(place, 0, 1))
+    for write in (lambda: place.write(_rows(place, 0, 1)), lambda: place.mark_missing([0])):
+        with pytest.raises(StoreError, match="has been replaced by another file"):
+            write()
     assert path.read_bytes() == before
 
 
