@@ -59,8 +59,9 @@ def compare(
         have the names in docs/compare.md. Modes have `speed` (m,) rad/s, `frequencies` (m, modes)
         rad/s.
     scene : a Scene, the name of a shipped scene, or a TOML file.
-    columns : a mapping file, or a mapping with the same keys: column, unit, sign, offset of each
-        channel, and whether it is wrapped. By default columns are identified by their names;
+    columns : path of a mapping file, or a dict with its keys: for each channel its column, with
+        unit, sign, offset, frame, and whether whole turns are missing; also `omit`, `only`,
+        `group`, `program`, `openfast`. By default columns are identified by their names;
         `verdict.read` of the result lists them.
     tolerance : bound on interval defects, beyond what the rounding of the data explains (rad);
         relative bound on loads and frequencies.
@@ -70,8 +71,9 @@ def compare(
     Raises
     ------
     InputError
-        If the data cannot be read or compared; the message is one line with file, column or row,
-        and what is allowed. Also if the reference and the defects take longer than the time limit.
+        If the mapping or the data cannot be read, or the data cannot be compared. The message has
+        one line per problem, with file, column or row, and what is allowed. Also if the reference
+        and the defects take longer than the time limit.
     TypeError
         If `data` or `columns` is neither a mapping nor text nor a path, if `scene` is neither a
         scene nor text nor a path, or if `timeout` or `tolerance` is not a number.
@@ -146,7 +148,8 @@ class DataComparison:
 
         `error_max` and `error_whole` are the largest errors up to the horizon and over all rows, in
         `unit`. `defect` is the largest defect beyond the rounding of the data, and `floor` the
-        largest defect that this rounding explains, both in `defect_unit`. The other columns have,
+        estimated effect of this rounding on a defect, of which three times is subtracted; both are
+        in `defect_unit`. The other columns have,
         for each of several levels, the time (s) up to which the errors stay within the level; for
         modes the speed (rad/s).
         """

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from rotor_mbs.comparison.data import ForeignData
-from rotor_mbs.comparison.data_defects import JudgedDefects
+from rotor_mbs.comparison.data_defects import SAME_START, JudgedDefects
 from rotor_mbs.comparison.data_mistakes import (
     MIN_ROWS,
     TrajectorySearch,
@@ -18,7 +18,6 @@ from rotor_mbs.comparison.data_mistakes import (
 from rotor_mbs.comparison.defect_search import QUICK_SEARCH, DefectSearch
 from rotor_mbs.comparison.faults import faults_in_time
 
-_SAME_START = 1e-3  # rad, rad/s: data whose first row differs by more start in another state
 # Data longer than this many times the scene's duration are searched even if all their errors and
 # defects are small: their times may be in another unit.
 _LONG = 2.0
@@ -32,8 +31,9 @@ def likely_causes(search: TrajectorySearch, judged: JudgedDefects | None) -> lis
 
     Mistakes in columns and times are tried first; then other models, other parameters and faults at
     some times; then scatter, or a factor of a channel. If the data start in another state than the
-    scene, other models are tried last, because the reason may be a mistake in one column. Only
-    scenes of the catalogue with the initial state of the data are tried before.
+    scene, other models are tried last, because the reason may be a mistake in one column. In this
+    case only one kind of other model is tried earlier, before scatter: scenes of the catalogue that
+    have the initial state of the data.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ def likely_causes(search: TrajectorySearch, judged: JudgedDefects | None) -> lis
     is_elsewhere = True
     if len(first.time):
         start = search.states_at(first.time[:1])[0, first.columns]
-        is_elsewhere = not np.abs(first.values[0] - start).max() <= _SAME_START
+        is_elsewhere = not np.abs(first.values[0] - start).max() <= SAME_START
     has_defects = judged is not None and not judged.is_rounding
     is_long = not search.data.time[-1] <= _LONG * search.scene.duration
     if search.worst <= search.tolerance and not has_defects and not is_long:

@@ -65,7 +65,8 @@ class DataTable:
     ----------
     source : name of the file in messages.
     columns : the columns by name, in the order of the file.
-    left_out : the other parts of the file by name, each with the reason why it is no column.
+    left_out : for each other part of the file, by its name, the reason why it is not read as a
+        column of numbers.
     program : "openfast" if the head of the file says that OpenFAST wrote it, otherwise "".
     headers : original names, by the new name, of columns that were renamed because an earlier
         column has the same name.
@@ -190,9 +191,9 @@ def table_of(
             continue
         if unit:
             stated[name] = unit
-    # An array of shape (1,) shows that the data are a table of modes with a single row, for one
-    # speed; first dimensions of length 1 are then kept. Other dimensions of length 1 come from
-    # MATLAB, whose arrays have at least two dimensions; they are removed.
+    # Dimensions of length 1 come from MATLAB, whose arrays have at least two dimensions; they are
+    # removed. An exception is a table of modes for a single speed, which an array of shape (1,)
+    # shows: arrays whose first dimension is 1 are then left as they are.
     is_single_row = any(values.shape == (1,) for values in numeric.values())
     for name, values in list(numeric.items()):
         squeezed = values if is_single_row and values.shape[:1] == (1,) else np.squeeze(values)
@@ -262,7 +263,7 @@ def _numbers(values: Any) -> tuple[NDArray[Any], str]:
     try:
         array = np.asarray(values)
         if array.dtype.kind in "US" and isinstance(values, list | tuple):
-            # NumPy has converted the numbers of a list with a text to texts. In an array of
+            # If a list contains a text, NumPy converts its numbers to texts, too. In an array of
             # objects they remain numbers.
             array = np.asarray(values, object)
     except (ValueError, TypeError) as exc:

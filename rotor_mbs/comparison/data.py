@@ -27,20 +27,21 @@ from rotor_mbs.scenario.keys import counted
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.trajectory import Array
 
-# Numbers of significant digits. Up to _FEW_DIGITS, numbers are tested by arithmetic; for more, they
-# are formatted as text. Up to _SURE_DIGITS, numbers may differ from their text by _ROUNDED_SINCE;
-# for more digits, nearly all numbers would fit with this tolerance. All doubles fit _ALL_DIGITS.
+# Numbers of significant digits. Whether numbers have a given number of digits is tested by
+# arithmetic up to _FEW_DIGITS digits, and by formatting them as text for more digits. In the test
+# by text, a relative difference of _ROUNDED_SINCE is allowed up to _SURE_DIGITS digits. For more
+# digits none is allowed: nearly any number would pass. No double needs more than _ALL_DIGITS.
 _FEW_DIGITS, _SURE_DIGITS, _ALL_DIGITS = 9, 14, 17
 # At most about this many numbers of a column, evenly spaced, are formatted as text: 1 us each.
 _MAX_WRITTEN = 20_000
 _ROUNDED_SINCE = 2.0 * 2.0**-52  # relative error of a unit conversion that follows the rounding
 _SINGLE_DIGITS = 8  # number of significant digits of single precision
 _SINGLE = 2.0**-24  # relative rounding error of single precision
-# Largest share of numbers with a coarser rounding in a column that is said to have a fixed number
-# of decimals.
+# A column is said to have a fixed number of decimals if at most this share of its numbers has a
+# coarser rounding than the others.
 _MAX_EXCEPTIONS = 0.05
-# Columns with fewer distinct values than this do not show their digits: the values may be input,
-# such as 0.5.
+# If a column has fewer distinct values than this, its number of written digits cannot be inferred:
+# the values may be input, such as 0.5, and not rounded.
 _MIN_DISTINCT = 10
 _SAMPLE = 200  # about this many numbers of a column are used where a sample is enough
 
@@ -56,7 +57,8 @@ class ForeignData:
         modes, `time` has the speeds, rad/s.
     channels : the channel of each column of `values`.
     rounding, time_rounding : (n, channels), (n,) half a unit in the last written digit of each
-        number, in SI units. Times with equal intervals have only the rounding of double precision.
+        number, in SI units. Times with nearly equal intervals are taken as exact to double
+        precision, or as sums of a step in double precision, see `rounding_of_steps`.
     read : a line for each channel: column, unit, and what was assumed.
     unused : for every other column, by its name, the reason why it is not compared.
     loads_left_out : names of the loads that are in unused columns although the mapping does not
@@ -132,7 +134,10 @@ class ForeignData:
 
     @property
     def columns(self) -> list[int]:
-        """Return the index of each channel among all channels of the scene, see `Channel`."""
+        """Return `Channel.column` of each channel.
+
+        This is its index among the scene's angles, rates and loads, or among the frequencies.
+        """
         return [channel.column for channel in self.channels]
 
 
@@ -393,9 +398,9 @@ def rounding_of_printed(
         exponents = np.floor(np.log10(np.where(sizes > 0.0, sizes, 1.0)))
         units = 0.5 * 10.0 ** (exponents + 1 - digits)
         last = np.maximum(last, np.where(sizes > 0.0, units, 0.0))
-    # Single precision is tested last, because numbers of single precision may seem to have 16
-    # digits. All doubles from 0.5 to 1 seem to have 16 digits: the gaps between these doubles are
-    # wider than the gaps between numbers of 16 digits.
+    # Single precision is tested even if a number of digits was found, because numbers of single
+    # precision may seem to have 16 digits. Any double from 0.5 to 1 seems to have 16: the gaps
+    # between these doubles are wider than the gaps between numbers of 16 digits.
     with np.errstate(over="ignore"):  # large doubles overflow in single precision
         single = np.asarray(judged, np.float32).astype(float)
     if np.array_equal(single, judged):
@@ -412,7 +417,7 @@ def _precision(columns: Sequence[Array], rounding: Sequence[Array]) -> str:
     rounding : (n,) rounding of each column, by `rounding_of_printed`.
     """
     rounded = []
-    digits = 0  # largest number of digits of the rounded columns; the other columns may have all
+    digits = 0  # largest number of digits of the rounded columns; the other columns may have 17
     for values, last in zip(columns, rounding, strict=True):
         sizes = np.abs(values)
         if (last > 10.0**-_FEW_DIGITS * sizes).any():
@@ -483,7 +488,8 @@ def _have_digits(values: Array, digits: int) -> bool:
             rounded = np.round(values / unit) * unit
         return np.allclose(values, rounded, rtol=1e-12, atol=0.0)
     # For more digits the arithmetic above is too coarse. The numbers are formatted as text and
-    # compared with the text. After the rounding, a number may have been converted to another unit.
+    # compared with the text. A small difference is allowed, because the numbers may have been
+    # converted to another unit after they were rounded.
     most = _ROUNDED_SINCE if digits <= _SURE_DIGITS else 0.0
     for value in values[:: 1 + len(values) // _MAX_WRITTEN].tolist():
         written = float(f"{value:.{digits - 1}e}")

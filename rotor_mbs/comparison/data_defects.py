@@ -14,17 +14,18 @@ from rotor_mbs.comparison.data import ForeignData
 from rotor_mbs.errors import InputError
 from rotor_mbs.models.lagrange.defects import FIT_ROWS, fitted_rates, interval_defects
 from rotor_mbs.scenario.scene import Scene
-from rotor_mbs.solution.defects import Defects
+from rotor_mbs.solution.defects import FLOOR_SAFETY, Defects
 from rotor_mbs.solution.trajectory import Array, Trajectory
 
 STRETCHES = (10, 100)  # numbers of rows over which defects are added up, to show a drift
-AT_FLOOR = 3.0  # the effect of rounding on a defect may be this many times its estimate
+SAME_START = 1e-3  # rad, rad/s: a first row and an initial state that differ by less are the same
 
 
 def carried_errors(reference: Trajectory, growth: Array, units: Array) -> Array:
     """Return the size to which a relative error of 1 in the initial state may have grown.
 
-    The error is relative to the largest angle up to a row, or to 1 rad if all angles are smaller.
+    A relative error of 1 is as large as the largest angle of the reference up to the row in
+    question, and at least 1 rad.
 
     Parameters
     ----------
@@ -163,7 +164,7 @@ def judged_defects(
     floors = np.maximum(defects.floors, 0.3 * np.median(defects.floors, axis=0) + 1e-18)
     is_judged = defects.is_resolved & np.isfinite(vectors).all(axis=1)
     sizes = np.abs(np.where(is_judged[:, None], values, 0.0))
-    excess = np.maximum(sizes - AT_FLOOR * floors, 0.0).max(axis=1, initial=0.0)
+    excess = np.maximum(sizes - FLOOR_SAFETY * floors, 0.0).max(axis=1, initial=0.0)
     return JudgedDefects(
         scene, defects, tolerance, units, values, floors, is_judged, excess, has_fitted_rates
     )

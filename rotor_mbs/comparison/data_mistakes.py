@@ -25,7 +25,6 @@ from rotor_mbs.comparison.column_readings import (
 )
 from rotor_mbs.comparison.data import ForeignData
 from rotor_mbs.comparison.data_defects import (
-    AT_FLOOR,
     STRETCHES,
     carried_errors,
     defects_of_data,
@@ -171,7 +170,7 @@ class TrajectorySearch:
         left = judged_defects(self.scene, defects, self.tolerance).largest
         for stretch in STRETCHES:
             sizes, floors = defects.over_rows(stretch)
-            left = max(left, float((sizes - AT_FLOOR * floors).max(initial=0.0)))
+            left = max(left, float((sizes - FLOOR_SAFETY * floors).max(initial=0.0)))
         return left
 
 
@@ -307,7 +306,7 @@ def _rows_between(search: TrajectorySearch) -> Iterator[Hypothesis[ForeignData]]
     inside = search.up_to_horizon(data)
     right = search.states_at(inside.time)[:, data.columns]
     largest = np.abs(data.values).max(axis=0)
-    allowed = AT_FLOOR * data.rounding + _INTERPOLATED * largest
+    allowed = FLOOR_SAFETY * data.rounding + _INTERPOLATED * largest
     for degree, text in ((1, "linearly"), (3, "by a cubic spline")):
         # Data that are interpolated between every fourth row are also interpolated between every
         # second row. The longest period is the right one: it is tried first.

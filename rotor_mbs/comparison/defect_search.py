@@ -15,7 +15,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor_mbs.comparison.data_defects import AT_FLOOR, JudgedDefects
+from rotor_mbs.comparison.data_defects import JudgedDefects
 from rotor_mbs.comparison.hypotheses import Explanation, Hypothesis, closest, explanations
 from rotor_mbs.comparison.other_rotors import (
     Parameter,
@@ -28,6 +28,7 @@ from rotor_mbs.comparison.other_rotors import (
 from rotor_mbs.errors import RotorError
 from rotor_mbs.models.lagrange.defects import FIT_ROWS, explicit_steps, quick_ends
 from rotor_mbs.scenario.scene import Scene
+from rotor_mbs.solution.defects import FLOOR_SAFETY
 from rotor_mbs.solution.trajectory import Array
 
 # An explanation may leave the share _LEFT of the largest defect, because the other program and the
@@ -100,7 +101,7 @@ class DefectSearch:
             windows = _tried_windows(judged, rows)
             rows = self.rows = (windows[:, None] + np.arange(FIT_ROWS - 1)).ravel()
             self._values, self._floors, self._from_intervals = _window_residuals(judged, windows)
-        excess = np.abs(self._values) - AT_FLOOR * self._floors
+        excess = np.abs(self._values) - FLOOR_SAFETY * self._floors
         largest = self._largest = float(excess.max(initial=0.0))
         self._allowed = max(_LEFT * largest, min(judged.tolerance, _LEFT_OF_SMALL * largest))
         self._begins, self._ends = defects.time[rows], defects.time[rows + 1]
@@ -267,7 +268,7 @@ class DefectSearch:
 
     def _largest_left(self, residual: Array) -> float:
         """Return the largest defect beyond rounding in a residual of shape (k, m), rad."""
-        return float((np.abs(residual) - AT_FLOOR * self._floors).max())
+        return float((np.abs(residual) - FLOOR_SAFETY * self._floors).max())
 
     def _share(self, residual: Array) -> float:
         """Return the weighted root mean square of a residual, as a share of that of the defects."""

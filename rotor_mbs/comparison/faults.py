@@ -15,11 +15,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor_mbs.comparison.data_defects import AT_FLOOR, JudgedDefects
+from rotor_mbs.comparison.data_defects import JudgedDefects
 from rotor_mbs.models.lagrange import closed_form
 from rotor_mbs.models.lagrange.defects import explicit_steps, quick_ends
 from rotor_mbs.models.lagrange.parameters import rotor_form
 from rotor_mbs.scenario.time_table import torque_place
+from rotor_mbs.solution.defects import FLOOR_SAFETY
 from rotor_mbs.solution.trajectory import Array
 
 UNKNOWN_FAULT = "a fault"  # first words of the text on a fault without a recognized pattern
@@ -305,7 +306,7 @@ def _explaining_loads(judged: JudgedDefects, rows: NDArray[np.int64]) -> tuple[A
     """
     values, effects = judged.values[rows], _effect_of_unit_load(judged, rows)
     usual = np.median(np.abs(judged.values[judged.is_judged]), axis=0)
-    usual = usual + AT_FLOOR * judged.floors[rows].max(axis=0)
+    usual = usual + FLOOR_SAFETY * judged.floors[rows].max(axis=0)
     # Each channel is divided by its own size, because a load may turn a pitch a million times as
     # far as the rotor.
     units = np.linalg.norm(values, axis=0) + _OF_USUAL * math.sqrt(len(rows)) * usual

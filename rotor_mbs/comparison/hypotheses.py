@@ -1,10 +1,11 @@
 """Define hypotheses that may explain a difference, and the search that tries them.
 
-All searches for causes have the same form: those in columns of a trajectory, in defects of
-intervals, in loads and in frequencies. A hypothesis has a text, a change of the data or the model,
+The searches for mistakes in columns and times, for other models, and for causes in loads and
+frequencies have the same form. A hypothesis has a text, a change of the data or the model,
 and a price, which is the number of mistakes or parameters that it assumes. A function measures how
 much of the difference a change leaves. A hypothesis explains the difference if its change leaves no
-more than is allowed. Then the cheapest explanations are named, or those that leave least.
+more than is allowed. Depending on the search, the first explanation is named, the cheapest ones, or
+those that leave least.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""Find the column, unit, sign and zero of each channel from a mapping file or names of columns.
+"""Find the column, unit, sign and offset of each channel from a mapping file or names of columns.
 
 The numbers of a channel are sign * (column + offset), with the offset in the unit of the column.
-The columns of channels that a mapping does not have are recognized by their names. See
+If a channel is not in the mapping, its column is recognized by the name of the column. See
 docs/compare.md.
 """
 
@@ -343,7 +343,8 @@ def _sources(
     -------
     dict, dict, tuple of str
         The sources by channel; the reasons, by name of the column, why recognized columns are not
-        compared; the names of loads in such columns that the mapping does not omit.
+        compared; the names of loads that are left out only because they are not in the mapping's
+        `only`.
 
     Raises
     ------
@@ -392,7 +393,7 @@ def _sources(
 
 
 def _without_frame(channel: Channel) -> Channel:
-    """Return a channel without the frame in its name, and so with the key of a mapping file."""
+    """Return a channel without the frame in its name. Its `key` is then that of mapping files."""
     return replace(channel, name=channel.name.partition(",")[0])
 
 

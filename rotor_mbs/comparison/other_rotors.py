@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor_mbs.comparison.coarse_methods import Step, coarse_methods
+from rotor_mbs.comparison.data_defects import SAME_START
 from rotor_mbs.comparison.hypotheses import Hypothesis
 from rotor_mbs.models.lagrange import closed_form
 from rotor_mbs.models.lagrange.closed_form import Accelerations
@@ -31,7 +32,6 @@ _QUARTERS = {90: math.pi / 2.0, 180: math.pi, 270: -math.pi / 2.0}
 # For each zero of the azimuth, the direction of gravity in the base with the same effect on the
 # motion.
 _GRAVITY_AT_QUARTER = {90: "+x", 180: "+z", 270: "-x"}
-_SAME_START = 1e-3  # rad, rad/s: a scene whose initial state differs by more is not a candidate
 _MAX_BLADES = 6  # largest number of blades for which the blades are also tried one by one
 # Fields of a scene with an entry per blade, and their keys in a scene file.
 _BEARING_FIELDS = {
@@ -200,7 +200,7 @@ def scenes_with_start(scene: Scene, first: Array) -> Iterator[Hypothesis[RotorMo
         start = np.array([*other.initial_angles, *other.initial_rates])
         if other.name == scene.name or len(start) != len(first):
             continue
-        if np.abs(start - first).max() < _SAME_START:
+        if np.abs(start - first).max() < SAME_START:
             yield Hypothesis(f"the scene {other.name}", RotorModel(other))
 
 

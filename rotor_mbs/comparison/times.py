@@ -2,7 +2,8 @@
 
 Some programs write a row twice at an event, some write rows of an initialisation before t = 0, and
 some write the rows from the end to the start. Rows that repeat another row are dropped. Data with
-different rows at one time are refused.
+different rows at one time are refused, unless a load jumps at this time: the row after the jump is
+then kept.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ _NEAR_ZERO = 1e-9  # a time whose distance from 0 is at most this share of an in
 # Largest difference, absolute or relative, of two rows that are taken as one state computed twice.
 _SAME_STATE = 1e-9
 _EQUAL = 1e-6  # relative: intervals that differ by no more than this are taken as equal
-_MOSTLY = 0.9  # smallest share of equal intervals with which a few others are taken as mistakes
+_MOSTLY = 0.9  # if at least this share of intervals is equal, the others are taken as mistakes
 _STEP_DIGITS = 12  # largest number of significant digits of a step that a user has chosen
 _ROUNDOFF = 2.0**-53  # relative rounding error of double precision
 _MIN_ROWS = 3  # smallest number of rows that are compared as a motion
@@ -73,9 +74,9 @@ def ordered_rows(
     if (np.diff(time) < 0.0).any():
         is_descending = bool((np.diff(time) <= 0.0).all())
         if is_descending:
-            # A file with descending times has the row after a jump of a load before the row before
-            # the jump. Sorting keeps the order of rows with equal times, so the rows are reversed
-            # before they are sorted.
+            # At a jump of a load there are two rows at one time. In a file with descending times,
+            # the row of the state after the jump comes first. Sorting keeps the order of rows with
+            # equal times, so the rows are reversed before they are sorted.
             places = places[::-1]
         places = places[np.argsort(time[places], kind="stable")]
         was = "from the end to the start" if is_descending else "not in the order of their times"

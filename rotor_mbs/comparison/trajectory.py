@@ -18,6 +18,7 @@ from rotor_mbs.comparison.channels import channel_key
 from rotor_mbs.comparison.columns import shown_names
 from rotor_mbs.comparison.data import ForeignData
 from rotor_mbs.comparison.data_defects import (
+    SAME_START,
     STRETCHES,
     carried_errors,
     defects_of_data,
@@ -57,13 +58,13 @@ from rotor_mbs.solution.trajectory import Array, Trajectory
 _TIME_ROUNDING = 1e-9
 _MIN_ROWS = 3  # fewer rows are too few to be compared
 _STAGES = 4  # number of stages: reference, interval defects, search for causes, loads
-_SAME_START = 1e-3  # rad, rad/s: data whose first row differs by more have another initial state
 # If all errors are within the tolerance, a cause may leave at most this share of the largest one.
 _LEFT_OF_SMALL_ERRORS = 0.02
 # Largest number of references that are kept for further data of the same scene and times, and
 # largest number of rows of each. With three blades they take up to some 12 MB.
 _MAX_KEPT, _MAX_KEPT_ROWS = 4, 20_000
-# Longest part without rows at the start or end of the motion, in largest intervals between rows.
+# At the start and at the end of the motion, this many times the largest interval between rows may
+# be without rows.
 _MAX_GAP = 1.5
 
 
@@ -113,13 +114,13 @@ class TrajectoryErrors:
     error : (rows, channels) magnitudes of the errors against the reference, rad and rad/s.
     per_growth : (rows, channels) `error` divided by `carried_errors`, the size to which a relative
         error of 1 at the start may have grown.
-    excess_per_growth : (channels,) largest value of this quotient up to the horizon, for the part
-        of `error` beyond rounding.
+    excess_per_growth : (channels,) largest value, up to the horizon, of the part of `error` beyond
+        rounding divided by `carried_errors`.
     predicted, defect_time : see `DataVerdict`.
     drift : rad, the largest sum of defects over 10 or 100 rows (`STRETCHES`), beyond rounding.
     drifting : channel and number of rows of `drift`, in words.
-    beyond_digits : the largest ratio of a defect, or of a sum of defects as in `drift`, to what
-        rounding makes of it.
+    beyond_digits : the largest ratio of a defect, or of a sum of defects as in `drift`, to its
+        floor, the estimated effect of rounding.
     missing : labels of the coordinates whose angles the data lack.
     """
 
@@ -351,8 +352,8 @@ def _rows_with_reference(
     inside = replace(inside, values=values)
     compared = inside.rows(slice(len(places)))
     defects, note = defects_of_data(scene, compared, reference, until)
-    # The time of a row is rounded to half a unit in its last digit. Multiplied by the rates of
-    # change, this rounding is an uncertainty of the row's numbers.
+    # The time of a row has a rounding error of up to half a unit in its last digit. Multiplied by
+    # the rates of change, this error is an uncertainty of the row's numbers.
     changes = np.zeros((len(places), 2 * len(scene.initial_angles)))
     moving = scene.moving_coordinates
     columns = [*moving, *(len(scene.initial_angles) + i for i in moving)]
@@ -393,9 +394,9 @@ def _errors_of(
         predicted = float(np.abs(rows.defects.predicted[: rows.until]).max())
     sums = _largest_sums(scene, rows.defects)
     beyond_digits = _beyond_digits(scene, tolerance, rows.defects)
-    # Errors are divided by the growth of an error of the initial state. Faults that are below the
-    # tolerance in each interval may add up to an error above it. Where the growth is small, such an
-    # error stays above the tolerance after the division.
+    # Errors divided by the error growth reveal faults that the defects do not: faults below the
+    # tolerance in each interval that add up. The division removes what merely grew from an error of
+    # the initial state.
     exact = rows.exact
     carried = carried_errors(exact.trajectory, exact.growth, exact.units)
     carried = carried[rows.places][:, data.columns]
@@ -462,7 +463,7 @@ class LargestSums(NamedTuple):
     Attributes
     ----------
     drift, drifting : see `TrajectoryErrors`.
-    beyond_digits : the largest ratio of a sum to what rounding makes of it.
+    beyond_digits : the largest ratio of a sum to its floor, the estimated effect of rounding.
     """
 
     drift: float = 0.0
@@ -499,7 +500,7 @@ def _largest_sums(scene: Scene, defects: Defects | None) -> LargestSums:
 
 
 def _beyond_digits(scene: Scene, tolerance: float, defects: Defects | None) -> float:
-    """Return the largest ratio of a defect to what rounding makes of it; 0 if none is known.
+    """Return the largest ratio of a defect to its floor; 0 if none is known.
 
     Rounding alone gives a ratio of at most 3 (`FLOOR_SAFETY`). A larger ratio shows a systematic
     error, even if the defect is far below the tolerance.
@@ -705,7 +706,7 @@ def _note_on_start(data: ForeignData, rows: ReferencedRows) -> list[str]:
     different = []
     for j, channel in enumerate(data.channels):
         value, start = rows.data.values[0, j], rows.expected[0, j]
-        if abs(value - start) > _SAME_START:
+        if abs(value - start) > SAME_START:
             different.append(f"{channel.name}: {value:.4g} (scene: {start:.4g})")
     if not different:
         return []

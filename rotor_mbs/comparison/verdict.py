@@ -23,8 +23,8 @@ LEVELS = (1e-3, 1e-6, 1e-9)  # levels of error in rad, rad/s or relative, see `a
 # Largest allowed defect of an interval, rad; also the largest allowed error of a load relative to
 # its largest magnitude, and of a frequency relative to the frequency.
 DEFAULT_TOLERANCE = 1e-6
-# Largest number of names of unused columns in a file, and largest length of all of them as JSON.
-# They are stored in an attribute, which has at most 64 kB in HDF5.
+# Largest number of unused columns that a results file lists, and largest length of their names and
+# reasons as JSON. They are stored in an attribute, which has at most 64 kB in HDF5.
 _MAX_NAMES, _MAX_NAME_BYTES = 100, 30_000
 
 
@@ -44,7 +44,8 @@ class ChannelErrors:
         divided by its `bound_factors` (see `solution.defects`). Rate: the same, with the defects
         converted to rad by `Defects.rate_units`. Load: the largest error relative to the load's
         largest magnitude. Frequency: the largest relative error.
-    floor : the largest defect or relative error that rounding can cause.
+    floor : largest estimated effect of rounding on a defect or relative error. The true effect may
+        be `FLOOR_SAFETY` times as large.
     agrees_until : see the function `agrees_until`.
     defect_unit : unit of `defect` and `floor`, or what they are relative to, in words.
     """
@@ -109,7 +110,7 @@ def agrees_until(rows: Array, error: Array) -> dict[str, float | None]:
     Parameters
     ----------
     rows : (n,) times, s, or speeds, rad/s.
-    error : (n,) absolute errors, in the unit of the levels.
+    error : (n,) magnitudes of the errors: rad, rad/s, or relative.
 
     Returns
     -------
@@ -143,7 +144,9 @@ def from_dictionary(stored: Mapping[str, Any]) -> DataVerdict:
 def defects_of_channel(
     scene: Scene, defects: Defects | None, channel: Channel
 ) -> tuple[Array, Array] | None:
-    """Return the magnitudes of a channel's interval defects, and the largest that rounding causes.
+    """Return the magnitudes of a channel's interval defects, and their floors.
+
+    A floor is the estimated effect of rounding.
 
     Parameters
     ----------
