@@ -1,6 +1,6 @@
-"""Adapt Exudyn, without window, console output or files.
+"""Adapt the Exudyn engine, and run it without window, console output or files.
 
-No other module imports it. It is loaded in its fast build, without range checks.
+No other module imports Exudyn. This module loads its fast build, which has no range checks.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from rotor_mbs.scenario.time_table import Interval, Segment, step_within, steps_
 from rotor_mbs.solution.trajectory import Array, Integration, limit_at_zero
 
 os.environ.setdefault("EXUDYN_MODULE", "fast")
-with contextlib.redirect_stdout(io.StringIO()):  # it prints a greeting on import
+with contextlib.redirect_stdout(io.StringIO()):  # Exudyn prints a greeting on import
     import exudyn
     from exudyn import itemInterface
 
@@ -36,15 +36,15 @@ with contextlib.redirect_stdout(io.StringIO()):  # it prints a greeting on impor
 _engine: Any = exudyn
 _engine.config.printToConsole = False
 _engine.config.suppressWarnings = True
-# Not by the engine's environment variable: with that it would set matplotlib's backend to Agg, also
-# for the caller's plots.
+# Suppress all windows. The engine also has an environment variable for this, but with the variable
+# it sets matplotlib's backend to Agg, also for the caller's plots.
 _engine.special.userInterface.SuppressAll(True)
 
 
 class Linearized(NamedTuple):
-    """Hold M δq̈ + D δq̇ + K δq + C δλ = 0 in the engine's coordinates.
+    """Hold the matrices of M δq̈ + D δq̇ + K δq + C δλ = 0 in the engine's coordinates.
 
-    M, K, D are (n, n), C (n, constraints), in SI units.
+    M, K and D are (n, n), and C is (n, constraints), all in SI units.
     """
 
     M: Array
@@ -54,19 +54,20 @@ class Linearized(NamedTuple):
 
 
 class System:
-    """Hold an assembled system of the engine, which each `integrate` starts anew."""
+    """Hold an assembled system of the engine; each `integrate` begins at its initial state."""
 
     def __init__(self, parts: Sequence[Part]) -> None:
         """Add all parts to a system, and assemble it.
 
         Parameters
         ----------
-        parts : in the order in which they are added: a part comes after those that it refers to.
+        parts : the parts, in the order in which they are added. A part comes after the parts that
+            it refers to.
 
         Raises
         ------
         MethodRefusal
-            If the engine does not take the parts, with its reason.
+            If the engine rejects the parts. The message has the engine's reason.
         """
         self._container = _engine.SystemContainer()
         self._mbs = self._container.AddSystem()
@@ -77,7 +78,7 @@ class System:
             if part.kind == "sensor"
             and "Acceleration" in str(part.parameters["outputVariableType"])
         ]
-        # By sensor, where the solver does not compute them.
+        # Accelerations at the initial state by sensor. Empty if the solver itself computes them.
         self._initial_values: dict[str, Array] = {}
         try:
             for part in parts:
@@ -94,7 +95,7 @@ class System:
         self._sensor_numbers = [self._numbers[Ref("sensor", name)] for name in self.sensors]
 
     def _argument(self, key: str, value: Any) -> object:
-        """Return an argument as the engine takes it: numbers of parts, and its own types."""
+        """Return an argument in the engine's form, with numbers of parts and the engine's types."""
         if isinstance(value, Ref):
             return self._numbers[value]
         if isinstance(value, tuple) and value and isinstance(value[0], Ref):
@@ -106,7 +107,7 @@ class System:
 
         Parameters
         ----------
-        sensor : its name.
+        sensor : name of the sensor.
 
         Returns
         -------
@@ -120,24 +121,24 @@ class System:
         return stored
 
     def linearized(self, step: float) -> Linearized:
-        """Return the engine's linearization at the initial state, by one-sided differences.
+        """Linearize the system at the initial state by the engine's one-sided differences.
 
         Parameters
         ----------
-        step : rad and m, of the differences.
+        step : step of the differences, rad or m.
         """
         settings = _engine.SimulationSettings()
         settings.solution.file.write = False
         differences = settings.staticSolver.newton.numericalDifferentiation
         differences.relativeEpsilon, differences.minimumCoordinateSize = step, 1.0
         M, K, D, *more = self._mbs.ComputeLinearizedSystem(settings, returnConstraintJacobian=True)
-        C = more[0] if more else np.zeros((len(M), 0))  # of a model without joints
+        C = more[0] if more else np.zeros((len(M), 0))  # a model without joints
         return Linearized(np.array(M), np.array(K), np.array(D), np.array(C))
 
     def forces(self) -> Array:
-        """Return applied and gyroscopic forces on the coordinates at the initial state, (n,).
+        """Return the applied and gyroscopic forces on the coordinates at the initial state, (n,).
 
-        The joints' forces are not among them.
+        The forces of the joints are left out.
         """
         solver, settings = _engine.MainSolverStatic(), _engine.SimulationSettings()
         settings.solution.file.write = False
@@ -167,14 +168,15 @@ class System:
         Parameters
         ----------
         scheme : solver and options.
-        intervals : from one stop to the next; on each of them all loads are linear.
-        rows_between : whether the sensors keep rows between samples, too.
-        set_segment : called with the loads of each interval before it is integrated.
+        intervals : intervals from one stop to the next. On each interval all loads are linear.
+        rows_between : whether the sensors also keep rows between samples.
+        set_segment : function that is called with the segment of each interval, before the interval
+            is integrated.
 
         Returns
         -------
         Integration
-            With the reason, where the end was not reached.
+            The report, with the reason if the end was not reached.
         """
         data = self._mbs.systemData
         data.SetSystemState(self._initial_state, _engine.ConfigurationType.Initial)
@@ -198,8 +200,9 @@ class System:
         for interval in intervals:
             set_segment(interval.segment)
             if interval is intervals[0] and scheme.lacks_initial_accelerations:
-                # What sensors of accelerations read at the initial state: only an implicit solver
-                # computes it. From a singular start the run itself will fail.
+                # Only an implicit solver computes the accelerations at the initial state. The
+                # acceleration sensors are read here and their values kept. If the initial state is
+                # singular, the error is suppressed here, and the run itself will fail.
                 plain, implicit = (
                     _engine.SimulationSettings(),
                     _engine.MainSolverImplicitSecondOrder(),
@@ -211,7 +214,7 @@ class System:
                         values = self._mbs.GetSensorValues(self._numbers[Ref("sensor", name)])
                         self._initial_values[name] = np.array(values, dtype=float)
                     implicit.FinalizeSolver(self._mbs, plain)
-                raise_if_over()  # its exception may have been suppressed above
+                raise_if_over()  # an error at the time limit may have been suppressed above
             trials.clear()
             settings.solution.sensors.append = interval is not intervals[0]
             span = (interval.end - interval.start) / interval.sample_intervals
@@ -224,8 +227,9 @@ class System:
             integration.startTime, integration.endTime = interval.start, interval.end
             integration.numberOfSteps = steps * interval.sample_intervals
             every_step = scheme.step is None and rows_between
-            # The engine adds up periods, with rounding. They are shortened by a tenth of a step
-            # over the whole interval, so that no row comes a step late.
+            # The engine adds up the periods between rows, with rounding errors. The periods of an
+            # interval are shortened by a tenth of a step in total. Otherwise a row could come one
+            # step late.
             period = span / rows * (1.0 - 0.1 / integration.numberOfSteps)
             settings.solution.sensors.writePeriod = 0.0 if every_step else period
             solver = (
@@ -245,11 +249,13 @@ class System:
                 break
             # The next interval starts where this one ended.
             data.SetSystemState(data.GetSystemState(), _engine.ConfigurationType.Initial)
-            # The engine would cut a longer step itself, with another rounding.
+            # The next interval begins with the last step size, but not with a step that is longer
+            # than an interval: the engine would shorten such a step itself, with another rounding.
             integration.initialStepSize = min(it.currentStepSize, interval.end - interval.start)
         return total
 
-    # For extrapolation: integrations of one interval from a state that the caller sets.
+    # The following members are for extrapolation. Each of its integrations starts from a state that
+    # the caller sets.
 
     @property
     def sensors(self) -> list[str]:
@@ -258,18 +264,22 @@ class System:
 
     @property
     def reference(self) -> Array:
-        """Return the values that the coordinates are displacements from, (n,)."""
+        """Return the reference values of the coordinates, (n,).
+
+        The engine's coordinates are displacements from these values.
+        """
         return np.array(
             self._mbs.systemData.GetODE2Coordinates(_engine.ConfigurationType.Reference)
         )
 
     def begin(self, scheme: Scheme, *, with_rows: bool) -> None:
-        """Go back to the initial state, to be integrated by an implicit scheme.
+        """Set the initial state, and prepare the calls of `advance` with an implicit scheme.
 
         Parameters
         ----------
         scheme : solver and options.
-        with_rows : whether sensors keep every step of the last `advance`; else they keep nothing.
+        with_rows : whether the sensors keep a row for every step of the last `advance`. Otherwise
+            they keep no rows.
         """
         data = self._mbs.systemData
         data.SetSystemState(self._initial_state, _engine.ConfigurationType.Initial)
@@ -279,22 +289,22 @@ class System:
         self._solver = _engine.MainSolverImplicitSecondOrder()
 
     def initial_values(self, time: float) -> tuple[Array, Array]:
-        """Compute the initial values of an integration, accelerations and multipliers included.
+        """Compute accelerations and multipliers at the start of the next integration.
 
         Parameters
         ----------
-        time : s, at which the integration starts.
+        time : s, time at which the integration starts.
 
         Returns
         -------
         values : ndarray
-            As of `values`.
+            The state with these accelerations and multipliers, in the form of the method `values`.
         turns : ndarray
-            As of `turns`.
+            The data coordinates, in the form of the method `turns`.
         """
-        # The engine differentiates the constraints' velocities by one-sided differences. They are
-        # polynomials of third degree in the coordinates, so that three steps, extrapolated to zero,
-        # leave rounding errors.
+        # For the accelerations the engine differentiates the velocities of the constraints by
+        # one-sided differences. The velocities are polynomials of third degree in the coordinates.
+        # Therefore an extrapolation from three steps to a step of zero leaves only rounding errors.
         integration = self._settings.timeIntegration
         integration.startTime, integration.endTime, integration.numberOfSteps = time, time + 1.0, 1
         integration.generalizedAlpha.computeInitialAccelerations = True
@@ -311,27 +321,27 @@ class System:
         return limit_at_zero(by_step[::-1], 2.0), self.turns()
 
     def advance(self, start: float, end: float, steps: int, total: Integration) -> str:
-        """Integrate from the state set last in equal steps.
+        """Integrate in equal steps from the state that was last set by `begin` or `start_from`.
 
         Parameters
         ----------
         start, end : s.
         steps : number of steps.
-        total : in which steps and evaluations are counted.
+        total : report to whose numbers of steps and evaluations those of this call are added.
 
         Returns
         -------
         str
-            Why it failed; "" where it did not.
+            The reason if the integration failed; otherwise "".
         """
         integration = self._settings.timeIntegration
         integration.startTime, integration.endTime, integration.numberOfSteps = start, end, steps
         return self._solve(self._solver, self._settings, 0, total)
 
     def values(self) -> Array:
-        """Return the state where the last integration ended.
+        """Return the state at the end of the last integration, (3 n + multipliers,).
 
-        Coordinates, rates, accelerations and multipliers, one after the other.
+        It consists of coordinates, rates, accelerations and multipliers, in this order.
         """
         data, current = self._mbs.systemData, _engine.ConfigurationType.Current
         return np.concatenate(
@@ -344,18 +354,29 @@ class System:
         )
 
     def turns(self) -> Array:
-        """Return the data coordinates where the last integration ended.
+        """Return the data coordinates at the end of the last integration.
 
-        They are the angles of springs over many turns.
+        Each is the angle of a spring, rad, which the engine follows over many turns.
         """
         return np.array(self._mbs.systemData.GetDataCoordinates(_engine.ConfigurationType.Current))
 
     def start_from(self, values: Array, turns: Array) -> None:
-        """Set the state from which the next integration starts, as of `values` and `turns`."""
+        """Set the state from which the next integrations start.
+
+        Parameters
+        ----------
+        values, turns : the state, in the form of the methods `values` and `turns`.
+        """
         self._set(values, turns, _engine.ConfigurationType.Initial)
 
     def _set(self, values: Array, turns: Array, where: Any) -> None:
-        """Set a state as one of the engine's configurations."""
+        """Set the state, without multipliers, of one of the engine's configurations.
+
+        Parameters
+        ----------
+        values, turns : the state, in the form of the methods `values` and `turns`.
+        where : the engine's configuration type, such as Initial or Current.
+        """
         data = self._mbs.systemData
         n = data.ODE2Size()
         data.SetODE2Coordinates(values[:n], where)
@@ -372,7 +393,7 @@ class System:
         Parameters
         ----------
         time : s.
-        values, turns : the state, as of the methods of these names.
+        values, turns : the state, in the form of the methods `values` and `turns`.
         """
         data, current = self._mbs.systemData, _engine.ConfigurationType.Current
         data.SetTime(time, current)
@@ -381,17 +402,17 @@ class System:
         return [self._mbs.GetSensorValues(number) for number in self._sensor_numbers]
 
     def _solve(self, solver: Any, settings: Any, stages: int, total: Integration) -> str:
-        """Run the solver from start to end time; return why it failed, or "".
+        """Run a solver from start to end time; return the reason if it failed, otherwise "".
 
         Parameters
         ----------
-        solver, settings : the engine's.
-        stages : evaluations in a step of an explicit solver; 0 for an implicit one.
-        total : to which steps and evaluations are added.
+        solver, settings : a solver of the engine, and the engine's settings with the times.
+        stages : number of evaluations in a step of an explicit solver; 0 for an implicit solver.
+        total : report to whose numbers of steps and evaluations those of this run are added.
         """
         failure = ""
-        # The engine replaces exceptions of signal handlers, as of Ctrl-C, by its own; here they
-        # reach the caller.
+        # The engine replaces an exception of a signal handler, such as that of Ctrl-C, by one of
+        # its own. `caller_signals` passes the handler's exception on to the caller.
         with caller_signals():
             try:
                 if not solver.SolveSystem(self._mbs, settings):
@@ -402,8 +423,8 @@ class System:
                     failure = (
                         _one_line(str(exc)) or _one_line(solver.GetErrorString()) or _NO_REASON
                     )
-        # The engine's index is one ahead of the steps it took, and two where the last one failed;
-        # an implicit step evaluates its residual once more than it iterates.
+        # The engine's step index is the number of steps taken plus 1, or plus 2 if the last step
+        # failed. An implicit step takes one evaluation of the residual more than Newton iterations.
         it = solver.it
         taken = max(0, it.currentStepIndex - (2 if failure else 1))
         evaluations = (
@@ -418,20 +439,26 @@ class System:
 
 _NO_REASON = "the engine gave no reason"
 
-# Number of coordinates and constraints from which on a sparse factorization costs less than a dense
-# one; a chain of twelve blades has so many. The sparse one's cost is proportional to their number,
-# the dense one's to its power of 2.5.
+# Smallest number of coordinates and constraints for which a sparse factorization costs less than a
+# dense one. A chain with ten blades, each body with Euler parameters, has 143. The cost of a sparse
+# factorization is proportional to this number, that of a dense one to its power of 2.5.
 _SPARSE_FROM = 140
 
-# From this number of coordinates of a tree on, a Jacobian, which takes as many evaluations, costs
-# more than the additional iterations with an old one. For a chain a Jacobian costs no more than two
-# evaluations, whatever the number of bodies.
+# Smallest number of coordinates of a tree for which a Jacobian is used for more than one step. A
+# Jacobian of a tree takes one evaluation for each coordinate. From this number on it costs more
+# than the additional iterations with an old Jacobian. A Jacobian of a chain costs at most as much
+# as two evaluations, whatever the number of bodies.
 _OLD_JACOBIAN_FROM = 13
 
 
 def linear_solver(coordinates: int, constraints: int) -> str:
-    """Return the engine's name of the linear solver for a system of that size."""
-    # A tree, without constraints, is one dense block.
+    """Return the engine's name of the linear solver for a system.
+
+    Parameters
+    ----------
+    coordinates, constraints : number of coordinates and of constraints in the system.
+    """
+    # A tree has no constraints. Its matrix is one dense block.
     return (
         "EigenSparse" if constraints and coordinates + constraints >= _SPARSE_FROM else "EigenDense"
     )
@@ -443,14 +470,14 @@ def _settings(scheme: Scheme, coordinates: int, constraints: int) -> Any:
     Parameters
     ----------
     scheme : solver and options.
-    coordinates, constraints : their numbers in the system.
+    coordinates, constraints : number of coordinates and of constraints in the system.
     """
     settings = _engine.SimulationSettings()
     settings.solution.file.write = False
     integration = settings.timeIntegration
     integration.solverType = getattr(_engine.DynamicSolverType, scheme.solver)
-    # A step that the engine halves by itself would miss the sample times: a fixed step is kept, or
-    # the run fails.
+    # Otherwise the engine would halve a step that fails, and then miss the sample times. So the
+    # run fails if a fixed step fails.
     integration.adaptiveStep = False
     for path, value in scheme.options.items():
         group, _, name = path.rpartition(".")
@@ -464,7 +491,7 @@ def _settings(scheme: Scheme, coordinates: int, constraints: int) -> Any:
 
 
 def _is_caused_by_limit(error: BaseException | None) -> bool:
-    """Return whether the engine made an error of its own of an OutOfTimeError."""
+    """Return whether an error is an OutOfTimeError, or was raised in place of one."""
     while error is not None:
         if isinstance(error, OutOfTimeError):
             return True
@@ -473,12 +500,12 @@ def _is_caused_by_limit(error: BaseException | None) -> bool:
 
 
 def _one_line(text: str) -> str:
-    """Return a text of the engine in one line of at most 300 characters."""
+    """Return a text of the engine as one line of at most 300 characters."""
     lines = [line.strip(" =*+\t") for line in text.splitlines()]
     return "; ".join(line for line in lines if line)[:300]
 
 
-# Arguments that the engine takes in its own types: the conversion by the name of the argument.
+# Functions that convert an argument to one of the engine's own types, by the argument's name.
 _TRANSLATIONS: dict[str, Callable[[Any], object]] = {
     "outputVariableType": lambda name: getattr(_engine.OutputVariableType, name),
     "localHT": lambda frame: _engine.HT(*frame),

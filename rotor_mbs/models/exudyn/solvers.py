@@ -1,4 +1,4 @@
-"""Run the engine's systems as solvers; the chain also by extrapolation between samples."""
+"""Solve scenes by the engine's time integrations, and the chain also by extrapolation."""
 
 from __future__ import annotations
 
@@ -25,23 +25,32 @@ from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import Interval, intervals
 from rotor_mbs.solution.trajectory import Array, Integration, Trajectory, all_coordinates
 
-# With 2, 4, ..., 14 substeps. Twelve and fourteen are needed for tolerances below 1e-9 rad.
+# Largest number of columns of the extrapolation table: results with 2, 4, ..., 14 substeps. Twelve
+# and fourteen substeps are needed for tolerances below 1e-9 rad.
 MOST_COLUMNS = 7
 
-# A part of an interval is at least 1/4096 of it.
+# Largest number of halvings of an interval: a part of it has at least 1/4096 of its length.
 _MOST_HALVINGS = 12
 
-# No estimate is smaller than some units in the last place of Euler parameters.
+# Smallest tolerance, rad. Error estimates do not get below some units in the last place of Euler
+# parameters.
 _ROUNDING = 100.0 * float(np.finfo(float).eps)
 
-# Components below this share of the largest of their kind are rounding errors, and set to zero.
-# Else motions that a symmetry forbids (pitches that stay at zero) begin with 1e-27 rad and grow to
-# the size of the others.
+# A component of a state below this share of the largest component of its kind is a rounding error,
+# and is set to zero. Otherwise motions that a symmetry forbids, such as those of pitches that stay
+# at zero, would begin with 1e-27 rad and grow to the size of the other motions.
 _INSIGNIFICANT = 0.5 * float(np.finfo(float).eps)
 
 
 def substeps(column: int) -> int:
-    """Return the number of equal steps of column 0, 1, ... of the extrapolation table."""
+    """Return the number of equal substeps with which a row of the extrapolation table begins.
+
+    Each row adds one column to the table.
+
+    Parameters
+    ----------
+    column : number of the row, and of the column that it adds, from 0.
+    """
     return 2 * (column + 1)
 
 
@@ -50,14 +59,14 @@ def neville(previous: Sequence[Array], values: Array) -> list[Array]:
 
     Parameters
     ----------
-    previous : the row before; [] for the first.
-    values : what the new number of substeps gives.
+    previous : the row before; [] for the first row.
+    values : result of the integration with the new number of substeps.
 
     Returns
     -------
     list of ndarray
-        The values, then those without the error's terms of second, fourth, ... power of the
-        substep.
+        The values; then the values without the term of second power of the substep in their error;
+        then without the terms of second and fourth power; and so on.
     """
     column = len(previous)
     row = [values]
@@ -67,40 +76,43 @@ def neville(previous: Sequence[Array], values: Array) -> list[Array]:
     return row
 
 
-# Extrapolation within each interval between samples (Gragg, Bulirsch, Stoer): from the same state
-# the trapezoidal rule takes 2, 4, 6, ... equal substeps, Neville's scheme in the square of the
-# substep eliminates one even power of the error with each column, and the next interval starts from
-# what the table ends with.
+# Each interval between samples is integrated by extrapolation (Gragg, Bulirsch, Stoer). From the
+# same state the trapezoidal rule takes 2, then 4, 6, ... equal substeps. Neville's scheme in the
+# square of the substep eliminates one even power of the error with each column. The next interval
+# starts from the last value of the table.
+#
+# The numbers of substeps are even. With constraints at velocity level, an error of the
+# accelerations along the constraints changes its sign with every step. This error is the same in
+# all columns only after an even number of steps.
 #
 # E. Hairer, S. P. Nørsett, G. Wanner, Solving Ordinary Differential Equations I, 2nd ed., II.9; E.
-# Hairer, G. Wanner, II, VI.5. Numbers of substeps are even: with constraints at velocity level an
-# error of the accelerations along the constraints changes its sign with every step, and only after
-# an even number of steps is it the same in all columns.
+# Hairer, G. Wanner, II, VI.5.
 
 
-# Accelerations and multipliers are carried over this many parts, over which their errors grow
-# little, and replaced where the accelerations are off by more than this share.
+# After each _PARTS_CARRIED parts, accelerations and multipliers are compared with those that the
+# state implies; over so few parts their errors grow little. They are replaced if the accelerations
+# differ by more than the share _LARGEST_CARRIED of the largest acceleration.
 _PARTS_CARRIED, _LARGEST_CARRIED = 10, 0.01
 
 
 class _Kept(NamedTuple):
-    """Hold the state at the end of a part of an interval, under the loads of that interval."""
+    """Hold the initial state, or the state at the end of a part of an interval."""
 
     time: float  # s
-    interval: Interval
-    values: Array  # as of `System.values`
-    turns: Array  # of the springs
-    work: float  # J
+    interval: Interval  # the interval whose loads act
+    values: Array  # the state, in the form of `System.values`
+    turns: Array  # the data coordinates, in the form of `System.turns`
+    work: float  # J, work of loads and dampers since the start of the run
 
 
 class ExtrapolatedSolver:
-    """Run the chain, extrapolated within each interval between samples; see `methods.base.Solver`.
+    """Integrate the chain by extrapolation within each interval; see `methods.base.Solver`.
 
     Attributes
     ----------
-    system : the assembled engine.
-    columns : of the extrapolation table, for each part of the last integration.
-    kept : the states at the ends of these parts.
+    system : the assembled system of the engine.
+    columns : number of columns of the extrapolation table for each part of the last integration.
+    kept : the initial state, and the states at the ends of these parts.
     """
 
     def __init__(self, scene: Scene, settings: ExtrapolatedSettings) -> None:
@@ -109,26 +121,26 @@ class ExtrapolatedSolver:
         Parameters
         ----------
         scene : the run.
-        settings : whose tolerance is for each part of an interval.
+        settings : settings with the tolerance for each part of an interval.
 
         Raises
         ------
         MethodRefusal
-            If the samples are too close, or the engine does not take the chain.
+            If the samples are too close to each other, or the engine rejects the chain.
         """
         self._scene, self._scheme, self._loads = scene, _scheme(scene, settings), Loads(scene)
         self._least_error = max(settings.tolerance, _ROUNDING)
         self._newton_tolerance = settings.newton_relative_tolerance
         self._intervals = intervals(scene.load_segments, scene.samples, every_sample=True)
-        # With dampers or loads over time the work depends on the path: it is extrapolated with the
-        # state.
+        # If dampers act or loads change over time, the work depends on the path. It is then
+        # extrapolated together with the state.
         self._integrates_work = scene.work_needs_path
         self._gives_loads = scene.wants("loads")
         parts = chain.parts(scene, self._loads)
         sensors = [part.name for part in parts if part.kind == "sensor"]
         self._of_rates = [name for name in sensors if name.endswith(("rotation", "spin"))]
-        # The engine evaluates stored sensors after every step: only those that the work needs are
-        # stored.
+        # The engine evaluates sensors that store their readings after every step. Only the sensors
+        # that the work needs are such sensors.
         for number, part in enumerate(parts):
             if part.kind == "sensor":
                 stored = part.name in self._of_rates
@@ -136,23 +148,24 @@ class ExtrapolatedSolver:
                     part, parameters={**part.parameters, "storeInternal": stored}
                 )
         self.system = System(parts)
-        # For each body three displacements and four Euler parameters, from which the coordinates
-        # are differences.
+        # (bodies, 7): reference values of three positions and four Euler parameters of each body.
+        # The engine's coordinates are the differences from these values.
         self._reference = self.system.reference.reshape(-1, 7)
         self._sizes = np.abs(self._reference).max(axis=0)
         self._coordinates = self._reference.size
         places = np.arange(3 * self._coordinates).reshape(3, -1, 7)
-        # of Euler parameters, their rates and accelerations
+        # (3, 4 bodies): places of the Euler parameters, of their rates and of their accelerations
+        # in a state.
         self._rotations = places[:, :, 3:].reshape(3, -1)
         self._total = Integration(True)
         self._halvings = 0
-        self.columns: list[int] = []  # of each part
+        self.columns: list[int] = []  # for each part
         self.kept: list[_Kept] = []
 
     def integrate(self) -> Integration:
-        """Integrate from sample to sample, and from kink to kink of the loads.
+        """Integrate interval by interval, to the end or to the first failure.
 
-        Where a load has a kink, accelerations and multipliers are calculated anew.
+        After a kink or a jump of a load, accelerations and multipliers are computed anew.
         """
         self._total = Integration(True)
         self._halvings, self.columns, self.kept = 0, [], []
@@ -175,21 +188,21 @@ class ExtrapolatedSolver:
         return self._total
 
     def _cross(self, interval: Interval, start: float, end: float, halvings: int) -> str:
-        """Integrate over a part of an interval, in one go or in halves.
+        """Integrate over a part of an interval, as a whole or in halves.
 
-        Parts are as small as the last ones had to be, and twice as large again where two columns
-        less would do.
+        A part is as small as the last parts had to be. If a part needs at least two columns less
+        than the most, the next parts may be twice as large.
 
         Parameters
         ----------
-        interval : whose loads act.
-        start, end : s, of the part.
-        halvings : how many times the interval was halved to get it.
+        interval : the interval, whose loads act.
+        start, end : s, start and end of the part.
+        halvings : number of times that the interval was halved to get the part.
 
         Returns
         -------
         str
-            Why the end was not reached; "" where it was.
+            The reason if the end of the part was not reached; otherwise "".
         """
         if halvings >= self._halvings:
             failure = self._part(interval, start, end)
@@ -209,12 +222,12 @@ class ExtrapolatedSolver:
 
         Parameters
         ----------
-        interval, start, end : as of `_cross`.
+        interval, start, end : as for `_cross`.
 
         Returns
         -------
         str
-            Why the end was not reached; "" where it was.
+            The reason if the end of the part was not reached; otherwise "".
         """
         row: list[Array] = []
         for column in range(MOST_COLUMNS):
@@ -227,8 +240,8 @@ class ExtrapolatedSolver:
             if self._integrates_work:
                 values = np.append(values, self._work(interval))
             row = neville(row, values)
-            # The difference is the error of the value beside it in the table, which has two orders
-            # less than the one that is kept.
+            # The difference of the last two values estimates the error of the last but one. The
+            # last value, which is kept, has an order that is higher by two.
             if column and self._is_met(row[-1] - row[-2], row[-1], end - start):
                 self.columns.append(column + 1)
                 state, gained = row[-1], 0.0
@@ -242,10 +255,10 @@ class ExtrapolatedSolver:
         )
 
     def _work(self, interval: Interval) -> float:
-        """Return the work of loads and dampers over the substeps of one column, J.
+        """Return the work of loads and dampers over the substeps of the last `advance`, J.
 
-        By the trapezoidal rule, whose error is a power series of the substep's square, as the
-        state's is.
+        The work is integrated by the trapezoidal rule. Its error is therefore a power series of the
+        square of the substep, like the error of the state.
         """
         tables = {name: self.system.rows(name) for name in self._of_rates}
         time = tables["hub spin"][:, 0]
@@ -257,14 +270,14 @@ class ExtrapolatedSolver:
     def _is_met(self, difference: Array, values: Array, span: float) -> bool:
         """Return whether an estimated error is within the tolerance.
 
-        Euler parameters are half of an angle, and so their error may be half of the tolerance.
-        Newton's method stops at a share of the forces: an error as small as it leaves cannot be
-        made smaller by another column.
+        The error of an angle is twice that of the Euler parameters. Newton's method stops when the
+        residual is below a share of the forces. Another column cannot reduce an error that is as
+        small as what Newton's method leaves, so such an error is accepted, too.
 
         Parameters
         ----------
-        difference, values : as of `System.values`, the estimate and the state.
-        span : s, of the part.
+        difference, values : estimated error and state, in the form of `System.values`.
+        span : s, length of the part.
         """
         rotations, rates, _ = np.abs(difference[self._rotations]).max(axis=1)
         error = 2.0 * max(rotations, span * rates)
@@ -274,16 +287,18 @@ class ExtrapolatedSolver:
         return bool(error <= self._newton_tolerance * span**2 * accelerations)
 
     def _consistent(self, values: Array) -> Array:
-        """Return an extrapolated state with Euler parameters of length one, and rates that keep it.
+        """Return an extrapolated state with Euler parameters of length one.
 
-        The engine takes both for granted: without this the errors of the length cause ten times as
-        large an error of the motion as all others. Rounding errors are set to zero.
+        The rates are changed, too, so that they keep this length. The engine assumes both. Without
+        the change, errors of the length would cause an error of the motion that is ten times as
+        large as all other errors. Components that are rounding errors are set to zero.
 
         Parameters
         ----------
-        values : as of `System.values`; changed in place.
+        values : the state, in the form of `System.values`; changed in place.
         """
-        # Three derivatives, bodies, displacement (3) and Euler parameters (4).
+        # (3, bodies, 7): coordinates, rates and accelerations of each body, for its position (3)
+        # and its Euler parameters (4).
         kinds = values[: 3 * self._coordinates].reshape(3, -1, 7)
         parameters = kinds[0, :, 3:] + self._reference[:, 3:]
         parameters /= np.sqrt((parameters * parameters).sum(axis=1))[:, None]
@@ -293,26 +308,26 @@ class ExtrapolatedSolver:
         sizes = np.abs(kinds)
         for columns in (slice(0, 3), slice(3, 7)):
             largest = sizes[:, :, columns].max(axis=(1, 2))
-            # Coordinates are displacements: their rounding is that of what they are displacements
-            # from.
+            # A coordinate is the displacement from a reference value, and has the rounding error of
+            # that value.
             largest[0] = max(largest[0], self._sizes[columns].max())
             insignificant = sizes[:, :, columns] < _INSIGNIFICANT * largest[:, None, None]
             kinds[:, :, columns][insignificant] = 0.0
         return values
 
     def _end_part(self, end: float, interval: Interval, values: Array, gained: float) -> None:
-        """Keep the state at the end of a part, with the accelerations and multipliers it implies.
+        """Keep the state at the end of a part; renew accelerations and multipliers if necessary.
 
-        With constraints at velocity level nothing holds the accelerations along the constraints,
-        nor the multipliers: their errors are carried from part to part and grow, with dampers
-        tenfold in a few turns. The loads have these errors; the motion feels them when they are
-        much larger than the accelerations.
+        Constraints at velocity level determine neither the accelerations along the constraints nor
+        the multipliers. Their errors are carried from part to part and grow, with dampers tenfold
+        in a few turns. These errors change the loads. They change the motion only if they are much
+        larger than the accelerations.
 
         Parameters
         ----------
-        end : s, of the part.
-        interval : whose loads act.
-        values : the extrapolated state, as of `System.values`.
+        end : s, end of the part.
+        interval : the interval, whose loads act.
+        values : the extrapolated state, in the form of `System.values`.
         gained : J, work of loads and dampers in the part.
         """
         turns, work = self.system.turns(), self.kept[-1].work + gained
@@ -323,7 +338,8 @@ class ExtrapolatedSolver:
             renewed, _ = self.system.initial_values(end)
         if is_due and self._is_off(values, renewed, end - self.kept[-1].time):
             values = renewed
-        # The motion is the same, whether loads are requested or not: only readings differ.
+        # The motion must not depend on whether loads are requested. The next part starts from
+        # `values`; `renewed` is only for the readings of the sensors.
         self._keep(end, interval, values, turns, work)
         if self._gives_loads:
             self.kept[-1] = self.kept[-1]._replace(values=renewed)
@@ -333,8 +349,9 @@ class ExtrapolatedSolver:
 
         Parameters
         ----------
-        values, renewed : as of `System.values`, carried and implied.
-        span : s, of the part.
+        values, renewed : the state with the carried and with the implied accelerations, in the form
+            of `System.values`.
+        span : s, length of the part.
         """
         accelerations = self._rotations[2]
         error = np.abs(renewed[accelerations] - values[accelerations]).max()
@@ -345,14 +362,14 @@ class ExtrapolatedSolver:
     def _keep(
         self, time: float, interval: Interval, values: Array, turns: Array, work: float
     ) -> None:
-        """Keep a state, from which the next part starts."""
+        """Keep a state, and let the next part start from it."""
         self.system.start_from(values, turns)
         self.kept.append(_Kept(time, interval, values, turns, work))
 
     def observe(self) -> Trajectory:
-        """Return the samples, from the sensors' readings at each state.
+        """Return the samples, computed from the readings of the sensors at each kept state.
 
-        At a jump of a load they are read under the load before it.
+        At a jump of a load the sensors are read with the load before the jump.
         """
         readings = []
         for kept in self.kept:
@@ -364,8 +381,8 @@ class ExtrapolatedSolver:
             for i, name in enumerate(self.system.sensors)
         }
         rows["work"] = np.array([[kept.time, kept.work] for kept in self.kept])
-        # A diverging state may overflow in its energies; the rows are cut where they stop being
-        # finite.
+        # The energies of a diverging state may overflow. The samples end before the first that is
+        # not finite.
         with np.errstate(over="ignore", invalid="ignore"):
             return sensor_samples.chain_trajectory(
                 self._scene, rows.__getitem__, self._integrates_work
@@ -374,12 +391,13 @@ class ExtrapolatedSolver:
 
 Reading = Callable[[Scene, Callable[[str], Array]], Trajectory]
 
-# s. The engine ends a run within 1e-10 s of its end, whatever the step.
+# Shortest time between samples, s. The engine ends a run within 1e-10 s of its end, whatever the
+# step.
 _SHORTEST_INTERVAL = 1e-8
 
 
 class MultibodySolver:
-    """Run a system by one of the engine's own time integrations; see `methods.base.Solver`."""
+    """Integrate a system by one of the engine's time integrations; see `methods.base.Solver`."""
 
     def __init__(
         self,
@@ -395,16 +413,16 @@ class MultibodySolver:
         Parameters
         ----------
         scene : the run.
-        parts : of the system.
-        loads : the loads that the parts' load functions read.
+        parts : the parts of the system.
+        loads : the loads that the load functions of the parts read.
         scheme : the time integration.
-        reading : makes the trajectory from recorded rows.
-        rows_between : whether it needs rows between samples.
+        reading : function that computes the trajectory from the recorded rows.
+        rows_between : whether `reading` needs rows between samples.
 
         Raises
         ------
         MethodRefusal
-            With the engine's reason, where the engine does not take the parts.
+            If the engine rejects the parts. The message has the engine's reason.
         """
         self._scene, self._loads, self._scheme, self._reading = scene, loads, scheme, reading
         self._rows_between = rows_between
@@ -421,8 +439,8 @@ class MultibodySolver:
 
     def observe(self) -> Trajectory:
         """Return the samples of the last integration."""
-        # A diverging state may overflow in its energies; the rows are cut where they stop being
-        # finite.
+        # The energies of a diverging state may overflow. The samples end before the first that is
+        # not finite.
         with np.errstate(over="ignore", invalid="ignore"):
             return self._reading(self._scene, self.system.rows)
 
@@ -433,12 +451,12 @@ def build_tree(scene: Scene, settings: SchemeSettings) -> Solver:
     Parameters
     ----------
     scene : the run.
-    settings : of the time integration.
+    settings : settings of the time integration.
 
     Raises
     ------
     MethodRefusal
-        If the samples are too close, or the engine does not take the tree.
+        If the samples are too close to each other, or the engine rejects the tree.
     """
     scheme, loads = _scheme(scene, settings), Loads(scene)
     if scene.wants("loads"):
@@ -455,13 +473,13 @@ def build_chain(scene: Scene, settings: ChainSettings) -> Solver:
     Parameters
     ----------
     scene : the run.
-    settings : of the time integration, and the node of a body.
+    settings : settings of the time integration, with the node of a body.
 
     Raises
     ------
     MethodRefusal
-        If loads are requested with the node whose multipliers are wrong, the samples are too close,
-        or the engine does not take the chain.
+        If loads are requested with the node rotation_vector, whose multipliers are wrong; if the
+        samples are too close to each other; or if the engine rejects the chain.
     """
     scheme = _scheme(scene, settings)
     if scene.wants("loads") and settings.node == "rotation_vector":
@@ -471,14 +489,14 @@ def build_chain(scene: Scene, settings: ChainSettings) -> Solver:
         )
     loads = Loads(scene)
     parts = chain.parts(scene, loads, settings.node)
-    # Its angles are unwrapped from row to row, so rows are kept between samples.
+    # The angles of the chain are unwrapped from row to row. This needs rows between samples.
     return MultibodySolver(
         scene, parts, loads, scheme, sensor_samples.chain_trajectory, rows_between=True
     )
 
 
 def build_extrapolated(scene: Scene, settings: ExtrapolatedSettings) -> Solver:
-    """Build the chain of a scene, to be extrapolated."""
+    """Build the solver that extrapolates the chain of a scene."""
     return ExtrapolatedSolver(scene, settings)
 
 
@@ -488,7 +506,7 @@ def _scheme(scene: Scene, settings: SchemeSettings | ExtrapolatedSettings) -> Sc
     Raises
     ------
     MethodRefusal
-        If the samples of the scene are too close for the engine.
+        If the samples of the scene are too close to each other for the engine.
     """
     if scene.duration / (scene.samples - 1) < _SHORTEST_INTERVAL:
         raise MethodRefusal(
