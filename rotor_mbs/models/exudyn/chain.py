@@ -1,7 +1,7 @@
 """Describe the rotor as a chain of free bodies connected by joints: ground, hub, blades.
 
-Its coordinates are redundant. Nodes are at centres of mass. A hub without mass or inertia is a body
-that has none: its joints determine its motion.
+Its coordinates are redundant. Nodes are at centres of mass. The hub is a body even without mass and
+inertia. Its joints then determine its motion.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class Placed:
     body: geometry.Body
     rotation: Array  # (3, 3) from its frame to the base frame
     quaternion: Array  # (4,) Euler parameters of the same rotation
-    axis: Array  # (3,) in the base frame, that it turns about in its bearing
+    axis: Array  # (3,) axis of its bearing, in the base frame
     omega: Array  # (3,) rad/s in the base frame, angular velocity
 
 
@@ -84,7 +84,7 @@ def _rotor_rotation(scene: Scene, about_shaft: float) -> Array:
 
 
 def parts(scene: Scene, loads: Loads, node: str = "euler_parameters") -> list[Part]:
-    """Return everything the engine has of a scene, in the order it is built.
+    """Return all parts of the engine's system for a scene, in the order in which they are added.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def parts(scene: Scene, loads: Loads, node: str = "euler_parameters") -> list[Pa
     built = [Part("object", "ground", "ObjectGround")]
     for placed in (hub, *blades):
         built += _body(placed, node)
-        # The engine has no gravity of its own: it is a load on every body.
+        # Free bodies have no gravity in the engine: gravity is a load on every body.
         if scene.gravity != 0.0 and placed.body.mass:
             mass = Part(
                 "marker",
@@ -136,7 +136,7 @@ def parts(scene: Scene, loads: Loads, node: str = "euler_parameters") -> list[Pa
             load["loadVectorUserFunction"] = _torque_on_shaft(scene, moment_on(scene, loads, 0))
         detail = "constant" if scene.has_constant_torque else "over time"
         built.append(Part("load", "rotor torque", "LoadTorqueVector", load, detail))
-    # From these sensors the joint angles and rates are computed: they are no coordinates here.
+    # Joint angles and rates are no coordinates here. They are computed from these sensors.
     bodies = [hub, *blades]
     for placed in bodies:
         name, of_node = placed.name, Ref("node", placed.name)
@@ -223,7 +223,7 @@ def _marker(body: str, where: str, rotation: Array, position: Array) -> Part:
     Parameters
     ----------
     body : its name.
-    where : what the marker's name says after the body's.
+    where : text after the body's name in the marker's name.
     rotation, position : (3, 3), and (3,) m, both in the body's frame.
     """
     parameters = {"bodyNumber": Ref("object", body), "localHT": (rotation, position)}
@@ -253,7 +253,7 @@ def _pitch_spring(scene: Scene, loads: Loads, blade: int, seat: str, root: str) 
     name, moment = f"pitch spring {blade + 1}", moment_on(scene, loads, 1 + blade)
     constants = {"stiffness": stiffness, "damping": damping, "offset": constant_value(rest)}
     if all(map(is_constant, scene.pitch_loads[blade])):
-        constants["torque"] = -moment.at(0.0)  # the engine adds its torque to what resists
+        constants["torque"] = -moment.at(0.0)  # the engine takes it as a resisting torque
     constants = {key: value for key, value in constants.items() if value}
     built, counter = [], ""
     if stiffness:

@@ -33,7 +33,7 @@ class Body:
 def rotation_y(cosine: float, sine: float) -> Array:
     """Return the turn about the shaft, (3, 3), by the cosine and the sine of its angle.
 
-    Its y row and column are exact, which keeps exact zeros out of plane.
+    Its y row and column are exact, so that components out of the rotor plane stay exactly zero.
     """
     return np.array([[cosine, 0.0, sine], [0.0, 1.0, 0.0], [-sine, 0.0, cosine]])
 
@@ -58,7 +58,7 @@ def mounting(scene: Scene, index: int) -> Array:
     Parameters
     ----------
     scene : the rotor.
-    index : of the blade, from 0.
+    index : number of the blade, from 0.
     """
     mounted, cone = rotation_y(*_turn(index, len(scene.blades))), scene.blades[index].cone
     return mounted @ rotation_x(-cone) if cone else mounted
@@ -72,7 +72,7 @@ def shaft_axis(scene: Scene) -> Array:
 def _turn(part: int, whole: int) -> tuple[float, float]:
     """Return cosine and sine of 2π part/whole, folded into the first half quadrant.
 
-    So blades that balance do so exactly.
+    This makes blades that balance each other balance exactly.
     """
     quarter, rest = divmod(4 * part, whole)
     quarters = min(rest, whole - rest) / whole
@@ -155,8 +155,8 @@ def fixed_blade_rotation(scene: Scene, index: int) -> Array:
 
     Parameters
     ----------
-    scene : the rotor, at whose initial pitch the blade is fixed.
-    index : of the blade, from 0.
+    scene : the rotor. The blade is fixed at its initial pitch.
+    index : number of the blade, from 0.
     """
     return mounting(scene, index) @ rotation_z(scene.initial_angles[1 + index])
 
@@ -167,7 +167,7 @@ def body_of_point(scene: Scene, index: int, point: Sequence[float]) -> tuple[int
     Parameters
     ----------
     scene : the rotor.
-    index : of the blade, from 0.
+    index : number of the blade, from 0.
     point : (3,) m in the blade's frame.
 
     Returns
@@ -175,7 +175,7 @@ def body_of_point(scene: Scene, index: int, point: Sequence[float]) -> tuple[int
     body : int
         0 for the hub, k for the k-th blade that pitches.
     place : ndarray, shape (3,)
-        m.
+        Place of the point in the frame of this body, m.
     """
     blades = movable_blades(scene)
     if index in blades:
@@ -192,8 +192,8 @@ def hub_body(scene: Scene) -> Body:
     """Return the hub as one rigid body with every blade that cannot pitch.
 
     The hub itself is a thin disc about the shaft. The disc's other two moments, half of the axial
-    one, have no effect: with them it is a body that can exist. Its mass, at the apex, affects only
-    the load on the shaft bearing, so that it has one only where loads are requested.
+    one, have no effect, but without them no such body could exist. The mass of the hub is at the
+    apex and affects only the load on the shaft bearing. It is left out unless loads are requested.
 
     Parameters
     ----------
@@ -257,10 +257,10 @@ def sensor(name: str, type_: str, quantity: str, detail: str = "", **where: obje
 
     Parameters
     ----------
-    name : of the sensor.
-    type_ : the engine's name of its type.
-    quantity : the engine's name of what it reads.
-    detail : text for `show --build`; the quantity where left out.
+    name : name of the sensor.
+    type_ : the engine's name of the sensor's type.
+    quantity : the engine's name of the quantity that the sensor reads.
+    detail : text for `show --build`; "" for the quantity.
     where : arguments that say what is measured.
     """
     stored = {"outputVariableType": quantity, "storeInternal": True, "writeToFile": False, **where}

@@ -1,8 +1,9 @@
-"""Linearize the engine's models by its own one-sided quotients, extrapolated to a step of zero.
+"""Linearize tree and chain by the engine's difference quotients, extrapolated to a step of zero.
 
-For joints the engine leaves out the geometric stiffness, by which constraint forces turn with the
-bodies: that is added from its constraint Jacobian beside the state. Without it the chain's
-frequencies under gravity are wrong by several percent.
+The engine's quotients are one-sided. For joints the engine leaves out the geometric stiffness, the
+effect of constraint forces that turn with the bodies. This stiffness is computed here from the
+engine's constraint Jacobians at neighbouring states. Without it the frequencies of the chain under
+gravity are wrong by several percent.
 """
 
 from __future__ import annotations
@@ -19,7 +20,8 @@ from rotor_mbs.models.exudyn.loads import Loads
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.trajectory import Array, Linearization, limit_at_zero, scene_at
 
-# rad, m: with each of these steps the extrapolation eliminates one more order of the error.
+# Steps of the difference quotients, rad or m. With each further step the extrapolation eliminates
+# one more order of the error.
 _STEPS = tuple(1e-3 * 2.0**k for k in range(6))
 
 
@@ -30,15 +32,15 @@ def linearize_tree(
 
     Parameters
     ----------
-    scene : the rotor and its loads as at t = 0.
+    scene : the rotor. Its loads have their values at t = 0.
     angles : (1 + blades,) rad.
-    speed : rad/s, of the rotor.
-    torque : N m, on the rotor.
+    speed : rate of the rotor, rad/s.
+    torque : constant torque on the rotor, N m.
 
     Raises
     ------
     MethodRefusal
-        If the engine does not take the scene.
+        If the engine rejects the tree.
     """
     state = scene_at(scene, angles, speed, torque)
     system = System(tree.parts(state, Loads(state)))
@@ -52,19 +54,19 @@ def linearize_chain(
 ) -> Linearization:
     """Linearize the chain at rest.
 
-    With N a basis of what the joints allow and λ their forces, its stiffness is Nᵀ (K + ∂(C λ)/∂q)
-    N.
+    The stiffness is Nᵀ (K + ∂(C λ)/∂q) N. The columns of N are a basis of the velocities that the
+    joints allow; λ are the multipliers of the joints.
 
     Parameters
     ----------
     scene : the rotor.
     angles : (1 + blades,) rad.
-    speed, torque : 0 rad/s, 0 N m.
+    speed, torque : must be 0 rad/s and 0 N m.
 
     Raises
     ------
     MethodRefusal
-        Where the engine does not take the scene, or the state is not an equilibrium at rest.
+        If the engine rejects the chain, or the state is not an equilibrium at rest.
     """
     if speed or torque:
         raise MethodRefusal("exudyn_chain: can be linearized at rest only")
@@ -72,12 +74,12 @@ def linearize_chain(
     system = System(chain.parts(state, Loads(state), "euler_parameters"))
     linear = _extrapolated(system.linearized)
     force = system.forces()
-    # In equilibrium the forces on the bodies are those of the joints alone.
+    # In equilibrium the forces of the joints balance all other forces on the bodies.
     multipliers = np.asarray(np.linalg.lstsq(linear.C, force, rcond=None)[0], dtype=np.float64)
     residual = np.abs(force - linear.C @ multipliers).max()
     if residual > 1e-7 * np.abs(force).max(initial=0.0) + 1e-12 * np.abs(linear.K).max():
         raise MethodRefusal(f"exudyn_chain: no equilibrium: unbalanced force {residual:g} N")
-    # Orthonormal basis of the velocities with Cᵀ q̇ = 0.
+    # N is an orthonormal basis of the velocities q̇ with Cᵀ q̇ = 0.
     vectors, singular_values, _ = np.linalg.svd(linear.C)
     rank = int(np.count_nonzero(singular_values > 1e-10 * singular_values[0]))
     N: Array = np.asarray(vectors[:, rank:])
@@ -96,7 +98,7 @@ def linearize_chain(
 
 
 def _joint_rates(scene: Scene) -> Array:
-    """Return the matrix that turns the rates of all bodies' coordinates into the joints' rates.
+    """Return the matrix that maps the rates of the bodies' coordinates to the rates of the joints.
 
     A body's coordinates are position and Euler parameters (e0, e); its angular velocity is
     2 (e0 ė - ė0 e + e × ė).
@@ -113,7 +115,8 @@ def _joint_rates(scene: Scene) -> Array:
     rows = np.zeros((len(bodies), 7 * len(bodies)))
     for k, placed in enumerate(bodies):
         rows[k, 7 * k + 3 : 7 * k + 7] = placed.axis @ _spin(placed)
-    # The rotor's rate turns a coned blade about its own axis, too; the pitch rate is the rest.
+    # The rotor's rotation has a component about the axis of a coned blade. The pitch rate is what
+    # remains of the blade's rate about this axis.
     for k, i in enumerate(movable_blades(scene), start=1):
         if scene.blades[i].cone:
             rows[k, 3:7] -= bodies[k].axis @ _spin(bodies[0])
@@ -121,7 +124,7 @@ def _joint_rates(scene: Scene) -> Array:
 
 
 def _spin(placed: chain.Placed) -> Array:
-    """Return the matrix that makes an angular velocity of the rates of Euler parameters, (3, 4)."""
+    """Return the (3, 4) matrix that maps rates of Euler parameters to an angular velocity."""
     p = placed.quaternion
     return 2.0 * np.column_stack([-p[1:], p[0] * np.eye(3) + np.cross(p[1:], np.eye(3)).T])
 
@@ -133,14 +136,14 @@ def _extrapolated(linearized: Callable[[float], Linearized]) -> Linearized:
 
 
 def _geometric_stiffness(system: System, multipliers: Array, N: Array, step: float) -> Array:
-    """Return ∂(C λ)/∂q N, (n, free): difference quotients along each column of N.
+    """Return ∂(C λ)/∂q N, (n, free), by difference quotients along each column of N.
 
     Parameters
     ----------
-    system : at the state.
+    system : the system, at the state of the linearization.
     multipliers : (constraints,) λ.
-    N : (n, free).
-    step : rad, m.
+    N : (n, free) basis of the velocities that the joints allow.
+    step : step of the difference quotients, rad or m.
     """
     start = system.coordinates
     here = system.linearized(_STEPS[0]).C @ multipliers

@@ -1,8 +1,9 @@
 """Define the loads that drive the rotor, and compute the loads on blade roots and shaft.
 
-The driving loads are load functions of the engine. The loads at roots and shaft, in N and N m,
-follow from multipliers of joints and moments of connectors in the chain; in the tree, and for a
-blade that is part of the hub, from Newton's and Euler's laws on the engine's accelerations.
+The engine calls load functions for driving loads that change over time. The loads on roots and
+shaft, in N and N m, are computed in two ways. In the chain they follow from multipliers of joints
+and moments of connectors. In the tree, and for a blade that is part of the hub, they follow from
+the engine's accelerations by Newton's and Euler's laws.
 """
 
 from __future__ import annotations
@@ -41,11 +42,11 @@ from rotor_mbs.solution.trajectory import Array
 
 
 class PrescribedMoment(NamedTuple):
-    """Describe a moment on a coordinate that is a factor times a load over time.
+    """Describe a moment on a coordinate. It is a factor times a load over time.
 
     Attributes
     ----------
-    coordinate : 0 for the rotor, then the pitches.
+    coordinate : 0 for the rotor, i for the pitch of blade i.
     load : place of the load in `Scene.load_tables`.
     factor : 1 for a torque, the spring's stiffness (N m/rad) for a rest angle (rad).
     """
@@ -56,10 +57,10 @@ class PrescribedMoment(NamedTuple):
 
 
 def prescribed_moments(scene: Scene) -> list[PrescribedMoment]:
-    """Return the moments that loads exert: torques, and those of moving rest angles.
+    """Return the moments that loads exert: torques, and moments of rest angles that change.
 
-    A spring whose rest angle r changes over time exerts k r. A rest angle that is constant is a
-    parameter of the spring itself.
+    A rest angle r that changes over time acts as a moment k r, with the stiffness k of the spring.
+    A constant rest angle is a parameter of the spring itself.
 
     Parameters
     ----------
@@ -91,12 +92,12 @@ class Loads:
 
 @dataclass(frozen=True)
 class Moment:
-    """Compute a moment as the sum of factors times loads, for a load function of the engine.
+    """Compute a moment, the sum of factors times loads, for a load function of the engine.
 
     Attributes
     ----------
-    loads : the loads over time.
-    terms : (load, factor) as of `PrescribedMoment`.
+    loads : the loads of the present interval.
+    terms : load and factor of each summand, as in `PrescribedMoment`.
     """
 
     loads: Loads
@@ -107,7 +108,7 @@ class Moment:
         return sum(factor * self.loads.segment.at(load, time) for load, factor in self.terms)
 
     def scalar(self, _system: object, time: float, _load: float) -> float:
-        """Return the moment; the engine's load function of a load on a coordinate."""
+        """Return the moment (N m). The engine calls this function for a load on a coordinate."""
         return self.at(time)
 
 
@@ -141,17 +142,17 @@ Sampled = Callable[[str], Array]
 
 
 def _motion_outputs(scene: Scene, i: int) -> dict[str, str]:
-    """Return the sensors that Newton's and Euler's laws need of a blade.
+    """Return the sensors that `_newton_euler` reads for a blade.
 
     Parameters
     ----------
     scene : the rotor.
-    i : the blade, from 0.
+    i : number of the blade, from 0.
 
     Returns
     -------
     dict
-        The engine's name of the output by the name of the sensor.
+        The engine's names of the output variables, by names of the sensors.
     """
     outputs = {"root acceleration": "Acceleration", "root rotation": "RotationMatrix"}
     if not scene.blades[i].is_point_mass:
@@ -161,27 +162,27 @@ def _motion_outputs(scene: Scene, i: int) -> dict[str, str]:
 
 
 def _newton_euler(scene: Scene, i: int, sampled: Sampled) -> tuple[Array, Array, Array]:
-    """Compute the load on a blade's root by Newton's and Euler's laws.
+    """Compute the load on a blade by Newton's and Euler's laws.
 
-    F = m (a + g e_z), M = I α + ω × I ω + r × F, with r the centre of mass and I the inertia about
-    it.
+    F = m (a + g e_z) and M = I α + ω × I ω + r × F, with the centre of mass r, its acceleration a
+    and the inertia I about it.
 
     Parameters
     ----------
     scene : the rotor.
-    i : the blade, from 0.
-    sampled : the values of a sensor by its name.
+    i : number of the blade, from 0.
+    sampled : (name of a sensor) -> its values.
 
     Returns
     -------
     force, moment : ndarray, shape (n, 3)
-        N and N m, about the apex, in the frame of the blade.
+        Force (N) and moment about the apex (N m), both in the frame of the blade.
     frames : ndarray, shape (n, 3, 3)
-        From that frame to the base frame.
+        Rotations from the frame of the blade to the base frame.
     """
     blade, name = scene.blades[i], f"blade {i + 1} root"
-    # From the blade's frame to that of the engine's body: the blade's own, or, where it cannot
-    # pitch, the hub's.
+    # Rotation from the blade's frame to that of the body in the engine. This body is the blade
+    # itself, or the hub if the blade cannot pitch.
     turned = np.eye(3) if i in movable_blades(scene) else fixed_blade_rotation(scene, i)
     frames = matrices(sampled(f"{name} rotation")) @ turned
     lifted = sampled(f"{name} acceleration") + np.array([0.0, 0.0, scene.gravity])
@@ -197,19 +198,20 @@ def _newton_euler(scene: Scene, i: int, sampled: Sampled) -> tuple[Array, Array,
 def tree_loads(scene: Scene, time: Array, sampled: Sampled) -> dict[str, Array]:
     """Compute the loads of the tree from the engine's accelerations.
 
-    Every blade by Newton's and Euler's laws; their sum, with the hub's share, is the load at the
-    shaft, and the moment of a pitch actuator is what they leave about the pitch axis.
+    Newton's and Euler's laws give the load on each blade. The load on the shaft is the sum of these
+    loads and the hub's share, minus the rotor torque. The moment of a pitch actuator is the blade's
+    moment about the pitch axis.
 
     Parameters
     ----------
     scene : the rotor.
-    time : (n,) s, of the samples.
-    sampled : the values of a sensor by its name.
+    time : (n,) s, times of the samples.
+    sampled : (name of a sensor) -> its values.
 
     Returns
     -------
     dict of ndarray
-        By quantity, (n, ...).
+        The loads, (n, ...), by name of the quantity.
     """
     blades = [_newton_euler(scene, i, sampled) for i in range(len(scene.blades))]
     shaft_force = sum(_in_base(frames, force) for force, _, frames in blades)
@@ -229,7 +231,7 @@ def tree_loads(scene: Scene, time: Array, sampled: Sampled) -> dict[str, Array]:
 
 
 def _add_along_shaft(scene: Scene, moments: Array, sizes: Array) -> None:
-    """Add moments along the shaft, (n,) N m, to moments in the base frame, (n, 3) N m."""
+    """Add moments along the shaft, (n,) N m, to moments in the base frame, (n, 3) N m, in place."""
     if not scene.shaft_tilt:
         moments[:, 1] += sizes
     else:
@@ -241,7 +243,7 @@ def _at_root(scene: Scene, force: Array, moment: Array) -> tuple[Array, Array]:
 
     Parameters
     ----------
-    scene : the rotor, whose hub may have a radius.
+    scene : the rotor, with the radius of its hub.
     force, moment : (n, 3) N and N m in the blade's frame.
     """
     if scene.hub_radius:
@@ -296,7 +298,7 @@ def chain_sensors(scene: Scene, hub: Body) -> list[Part]:
 
 
 def _joint_sensors(joint: str, connector: str) -> list[Part]:
-    """Return the sensors of a joint and, where it has one, of its spring or damper."""
+    """Return the sensors of a joint and of its connector, a spring or damper; "" for none."""
     outputs = {f"{joint} force": ("ForceLocal", joint), f"{joint} torque": ("TorqueLocal", joint)}
     if connector:
         outputs[f"{connector} torque"] = ("TorqueLocal", connector)
@@ -312,12 +314,12 @@ def chain_loads(scene: Scene, sampled: Sampled) -> dict[str, Array]:
     Parameters
     ----------
     scene : the rotor.
-    sampled : the values of a sensor by its name.
+    sampled : (name of a sensor) -> its values.
 
     Returns
     -------
     dict of ndarray
-        By quantity, (n, ...).
+        The loads, (n, ...), by name of the quantity.
     """
     hub = matrices(sampled("hub rotation"))
     roots, actuators = [], np.zeros((len(hub), len(scene.blades)))
@@ -330,7 +332,8 @@ def chain_loads(scene: Scene, sampled: Sampled) -> dict[str, Array]:
         force, moment = _joint_reaction(f"pitch bearing {i + 1}", seat, frames, sampled)
         if is_driven(scene, i):
             actuators[:, i] = -sampled(f"pitch spring {i + 1} torque")[:, 0]
-        # A joint has no moment about its own axis: there the connector acts.
+        # A joint exerts no moment about its own axis. The moment about this axis is that of the
+        # connector.
         along = actuators[:, i, None] * [0.0, 0.0, 1.0]
         roots.append(_at_root(scene, _in_frames(frames, force), _in_frames(frames, moment) + along))
     ground = np.broadcast_to(rotation_x(scene.shaft_tilt) @ ALONG_SHAFT, hub.shape)
@@ -343,14 +346,15 @@ def chain_loads(scene: Scene, sampled: Sampled) -> dict[str, Array]:
 def _joint_reaction(joint: str, seat: Array, root: Array, sampled: Sampled) -> tuple[Array, Array]:
     """Compute the force and the moment of a joint on its second body.
 
-    The engine gives the force on the first body, and multipliers λ of the constraints x₁·z₀ = 0 and
-    y₁·z₀ = 0, which are the moment λ₀ z₀ × x₁ + λ₁ z₀ × y₁.
+    The engine returns the force on the first body, in the axes of `seat`, and the multipliers λ of
+    the constraints x₁·z₀ = 0 and y₁·z₀ = 0. Here z₀ is an axis of `seat`, x₁ and y₁ are axes of
+    `root`. The moment is λ₀ z₀ × x₁ + λ₁ z₀ × y₁.
 
     Parameters
     ----------
-    joint : its name.
-    seat, root : (n, 3, 3) its frames on the first and on the second body.
-    sampled : the values of a sensor by its name.
+    joint : name of the joint.
+    seat, root : (n, 3, 3) frames of the joint on the first and on the second body.
+    sampled : (name of a sensor) -> its values.
 
     Returns
     -------
@@ -369,10 +373,10 @@ def matrices(rows: Array) -> Array:
 
 
 def _in_base(frames: Array, vectors: Array) -> Array:
-    """Return (n, 3) vectors of a body's frames, (n, 3, 3), in the base frame."""
+    """Transform (n, 3) vectors to the base frame from a body's frames, (n, 3, 3)."""
     return np.asarray((frames @ vectors[:, :, None])[:, :, 0])
 
 
 def _in_frames(frames: Array, vectors: Array) -> Array:
-    """Return (n, 3) vectors of the base frame in a body's frames, (n, 3, 3)."""
+    """Transform (n, 3) vectors from the base frame to a body's frames, (n, 3, 3)."""
     return np.asarray((vectors[:, None, :] @ frames)[:, 0, :])

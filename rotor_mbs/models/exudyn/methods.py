@@ -20,10 +20,11 @@ def _method(model: str, integrator: str, label: str, builder: str = "", **facts:
 
     Parameters
     ----------
-    model, integrator : the two parts of its name.
-    label : of the integrator.
-    builder : the function build_... in `solvers`; that of the model where left out.
-    facts : other fields of the `Method`.
+    model, integrator : the two parts of the method's name.
+    label : label of the integrator.
+    builder : name, without "build_", of the function in `solvers` that builds the solver; "" for
+        the function of the model.
+    facts : values of other fields of the `Method`.
     """
     in_tree = model == "exudyn_tree"
     kind = "tree" if in_tree else "chain"
@@ -40,7 +41,8 @@ def _method(model: str, integrator: str, label: str, builder: str = "", **facts:
     )
 
 
-# By setting: what the names and the labels of curves have for it. The first is the default.
+# Text in the name of a curve, and text in its label, by the value of a setting: spectral_radius and
+# node. The first value is the default.
 _RADII = {0.9: ("", ""), 0.7: ("_rho0.7", "ρ∞ 0.7"), 1.0: ("_rho1.0", "ρ∞ 1")}
 _NODES = {"euler_parameters": ("", ""), "rotation_vector": ("_rotation_vector", "rotation vector")}
 

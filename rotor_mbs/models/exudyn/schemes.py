@@ -19,10 +19,10 @@ class Scheme:
 
     Attributes
     ----------
-    solver : the engine's name of it.
-    stages : evaluations in a step; 0 for an implicit one.
+    solver : the engine's name of the scheme.
+    stages : number of evaluations in a step; 0 for an implicit scheme.
     options : values by dotted path below the engine's settings of a time integration.
-    step : s, the largest; None where the scheme chooses its own.
+    step : s, the largest step; None if the scheme chooses its step.
     trial_steps : for a scheme that chooses its step: trials within one integration interval after
         which the run is given up (the engine itself repeats a rejected smallest step for ever).
     """
@@ -36,7 +36,7 @@ class Scheme:
     def with_accelerations(self) -> Scheme:
         """Return this scheme with accelerations at the end of every step.
 
-        An implicit one computes them anyway.
+        An implicit scheme computes them anyway, and is returned unchanged.
         """
         return (
             replace(self, options={**self.options, _END_ACCELERATIONS: True})
@@ -81,8 +81,9 @@ class Rk67Settings(Settings):
 class Dopri5Settings(Settings):
     """Dormand-Prince 5(4) with the engine's step control.
 
-    It scales the error by absolute + relative · max(x, x_new), without the magnitude of x, which
-    vanishes at x = -absolute/relative: hence a relative tolerance of 0.
+    The control divides the error by absolute + relative · max(x, x_new), without taking magnitudes.
+    This divisor vanishes at x = -absolute/relative. Therefore the default of `relative_tolerance`
+    is 0.
     """
 
     relative_tolerance: float = number(
@@ -172,7 +173,8 @@ class ChainNewmarkSettings(NewtonSettings):
     node: str = _NODE
 
 
-# Newton's method stops at this share of the tolerance; below the least, rounding stops it.
+# Newton's method stops at this share of the tolerance. Its own tolerance has a lower limit, below
+# which rounding errors would keep the residual.
 _NEWTON_SHARE, _LEAST_NEWTON_TOLERANCE = 0.1, 1e-12
 
 
@@ -198,9 +200,9 @@ class ExtrapolatedSettings(Settings):
 
     def scheme(self) -> Scheme:
         """Return the trapezoidal rule that is extrapolated."""
-        # The engine's Jacobian leaves out how the constraints' directions turn, so that Newton's
-        # method converges linearly with a new Jacobian as with an old one: one for each step, and
-        # no other while the residual falls.
+        # The engine's Jacobian leaves out that the directions of the constraints turn. Therefore
+        # Newton's method converges only linearly, with a new Jacobian as with an old one. Each step
+        # has one Jacobian, and gets no other as long as the residual decreases.
         options = {
             "generalizedAlpha.useNewmark": True,
             "generalizedAlpha.useIndex2Constraints": True,

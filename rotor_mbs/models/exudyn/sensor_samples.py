@@ -1,6 +1,6 @@
-"""Compute a trajectory from the recorded rows of the sensors, for both models.
+"""Compute a trajectory from the recorded rows of the sensors, for tree and chain.
 
-Energy of the springs and work of the loads are computed here, too.
+This module also computes the energy of the springs and the work of the loads.
 """
 
 from __future__ import annotations
@@ -32,28 +32,28 @@ from rotor_mbs.solution.trajectory import (
 
 
 class _Reader:
-    """Read the rows of all sensors, one for each time, as long as the state is finite.
+    """Read the rows of all sensors, up to the last at which the state is finite.
 
     Attributes
     ----------
-    time : (rows,) s.
-    samples : the row of each sample that was reached.
+    time : (rows,) s; all times are different.
+    samples : number of the row of each sample that was reached.
     """
 
     def __init__(
         self, scene: Scene, recorded: Callable[[str], Array], state: Iterable[str]
     ) -> None:
-        """Find the rows, from the tables of the sensors named in `state`.
+        """Find the rows to be read, and those of the samples.
 
         Parameters
         ----------
         scene : the run.
-        recorded : the (n, 1 + k) rows of a sensor by its name, time first.
-        state : names of the sensors that must be finite.
+        recorded : (name of a sensor) -> its (n, 1 + k) recorded rows, time first.
+        state : names of the sensors of the state. A row is read only if their values are finite.
         """
         tables = {name: recorded(name) for name in state}
         time = next(iter(tables.values()))[:, 0]
-        # Two intervals share the row they meet at.
+        # Where two intervals meet, each has recorded a row. Only the first of the two is read.
         spacing = scene.duration / (scene.samples - 1)
         is_distinct = np.diff(time) > 1e-9 * spacing
         distinct = np.flatnonzero(np.concatenate([[True], is_distinct]))
@@ -61,7 +61,7 @@ class _Reader:
         self._rows = distinct[:count]
         self._tables, self._recorded = tables, recorded
         self.time = time[self._rows]
-        # The row of each sample, as far as they were reached without a gap.
+        # The row of each sample, up to the first sample that has no row.
         wanted = sample_times(scene)
         slack = 1e-6 * spacing
         rows = np.searchsorted(self.time, wanted - slack)
@@ -86,7 +86,7 @@ def tree_trajectory(scene: Scene, recorded: Callable[[str], Array]) -> Trajector
     Parameters
     ----------
     scene : the run.
-    recorded : as of `_Reader`.
+    recorded : as for `_Reader`.
     """
     read = _Reader(scene, recorded, ("angles", "rates"))
     angles, rates = all_coordinates(scene, read.all("angles"), read.all("rates"))
@@ -102,14 +102,14 @@ def chain_trajectory(
 ) -> Trajectory:
     """Return the samples of the chain.
 
-    Joint angles are those of the bodies' rotation matrices, rates those of their angular
-    velocities.
+    The joint angles are computed from the rotation matrices of the bodies, the joint rates from
+    their angular velocities.
 
     Parameters
     ----------
     scene : the run.
-    recorded : as of `_Reader`.
-    has_work : whether there are rows "work" in J, so that `work` need not integrate.
+    recorded : as for `_Reader`.
+    has_work : whether `recorded` has the work (J) as rows "work". Otherwise it is computed here.
     """
     placed = chain.placed_bodies(scene)
     bodies = [(part.name, part.body) for part in placed]
@@ -117,7 +117,8 @@ def chain_trajectory(
     read = _Reader(scene, recorded, state)
     angles, rates = _joint_motion(scene, read)
     fields = _fields(scene, read, angles, rates, bodies, has_work)
-    # Every body's own apex, which the joints keep together with the ground's and the hub's.
+    # The apex of each body, from the body's own position. The joints keep the apex of the hub at
+    # that of the ground, which is the origin, and the apexes of the blades at that of the hub.
     centres = []
     for name, body in bodies:
         rotations = matrices(read.sampled(f"{name} rotation"))
@@ -136,20 +137,20 @@ def _joint_motion(scene: Scene, read: _Reader) -> tuple[Array, Array]:
 
     Parameters
     ----------
-    scene : the run; its initial angles have the turns at the start.
+    scene : the run. Its initial angles give the number of whole turns at the start.
     read : the rows of the sensors.
     """
     hub = matrices(read.all("hub rotation"))
-    if scene.shaft_tilt:  # to the shaft frame, as the blades below
+    if scene.shaft_tilt:  # from the base frame to the shaft frame, as for blades below
         hub = rotation_x(-scene.shaft_tilt) @ hub
     rates = joint_rates(scene, read.all)
-    # The matrix of a turn about y has the sine and the cosine twice: their mean is used.
+    # The matrix of a rotation about y has the sine twice, and the cosine twice. The mean is used.
     twice_sine = hub[:, 0, 2] - hub[:, 2, 0]
     twice_cosine = hub[:, 0, 0] + hub[:, 2, 2]
     wrapped = np.arctan2(twice_sine, twice_cosine)
     angles = [unwrap(read.time, wrapped, rates[:, 0], scene.initial_angles[0])]
     for column, i in enumerate(movable_blades(scene), start=1):
-        # Axes of the blade, and of its seat on the hub at a pitch of zero.
+        # Axes x and y of the blade, and their directions seat_x and seat_y at a pitch of zero.
         blade = matrices(read.all(f"blade {i + 1} rotation"))
         if scene.shaft_tilt:
             blade = rotation_x(-scene.shaft_tilt) @ blade
@@ -170,7 +171,7 @@ def joint_rates(scene: Scene, values: Callable[[str], Array]) -> Array:
     Parameters
     ----------
     scene : the rotor.
-    values : the (n, k) values of a sensor by its name.
+    values : (name of a sensor) -> its (n, k) values.
     """
     hub = matrices(values("hub rotation"))
     hub_spin = values("hub spin")
@@ -195,15 +196,15 @@ def _fields(
     bodies: Sequence[tuple[str, Body]],
     has_work: bool = False,
 ) -> dict[str, Array]:
-    """Return the quantities that the scene requests, at the samples, loads not among them.
+    """Return the requested quantities except for loads, at the samples, by name.
 
     Parameters
     ----------
     scene : the run.
     read : the rows of the sensors.
     angles, rates : (rows, 1 + blades) rad and rad/s.
-    bodies : name and body of everything that has energy.
-    has_work : as of `chain_trajectory`.
+    bodies : names and bodies of hub and blades that pitch.
+    has_work : as for `chain_trajectory`.
     """
     fields = {"angles": angles[read.samples], "rates": rates[read.samples]}
     if scene.wants("tip"):
@@ -234,14 +235,15 @@ def _fields(
 def unwrap(time: Array, wrapped: Array, rates: Array, start: float) -> Array:
     """Return continuous angles, (n,) rad, from angles that are known up to whole turns.
 
-    From row to row the turn is the one nearest to what the mean of the measured rates predicts.
+    The mean of the rates in two rows predicts the change of the angle from one to the other. The
+    change that is nearest to the prediction is taken.
 
     Parameters
     ----------
     time : (n,) s.
-    wrapped : (n,) rad, up to whole turns.
+    wrapped : (n,) rad, angles up to whole turns.
     rates : (n,) rad/s.
-    start : rad, whose turns the first row gets.
+    start : rad. The first angle is the one nearest to it.
     """
     turn = 2.0 * np.pi
     predicted = 0.5 * np.diff(time) * (rates[1:] + rates[:-1])
@@ -252,10 +254,11 @@ def unwrap(time: Array, wrapped: Array, rates: Array, start: float) -> Array:
 
 
 def springs(scene: Scene, angles: Array) -> tuple[Array, Array]:
-    """Compute the energy of the springs, and the work of moving rest angles that `work` leaves out.
+    """Compute the energy of the springs, and the work of rest angles that `work` leaves out.
 
-    The energy is ½ k (θ - r)². Of the work -∫ k (θ - r) dr of a rest angle r, jumps included,
-    `work` has ∫ k r dθ; the rest of it is the change of ½ k r (r - 2θ).
+    The energy is ½ k (θ - r)². The work of a rest angle r that changes is -∫ k (θ - r) dr, jumps
+    included. The function `work` includes ∫ k r dθ instead. The difference of the two integrals is
+    the change of ½ k r (r - 2θ).
 
     Parameters
     ----------
@@ -264,8 +267,10 @@ def springs(scene: Scene, angles: Array) -> tuple[Array, Array]:
 
     Returns
     -------
-    energy, of_rests : ndarray, shape (n,)
-        J.
+    energy : ndarray, shape (n,)
+        Energy of the springs, J.
+    of_rests : ndarray, shape (n,)
+        Work to be added to that of the function `work`, J.
     """
     energy, of_rests = np.zeros((2, len(angles)))
     for i in movable_blades(scene):
@@ -281,19 +286,19 @@ def springs(scene: Scene, angles: Array) -> tuple[Array, Array]:
 
 
 def work(scene: Scene, time: Array, angles: Array, rates: Array) -> Array:
-    """Compute the work of the torques less what the dampers took, (n,) J.
+    """Compute the work of the torques minus the energy that the dampers dissipate, (n,) J.
 
-    A spring whose rest angle r changes counts as one that is unloaded at 0 and a torque k r; see
-    `springs`.
+    A spring whose rest angle r changes counts as a spring with a rest angle of 0 and a torque k r;
+    see `springs`.
 
     Parameters
     ----------
     scene : the run.
-    time : (n,) s of all rows, samples among them.
+    time : (n,) s, times of all rows, with those of the samples.
     angles, rates : (n, 1 + blades) rad and rad/s.
     """
     if not scene.work_needs_path:
-        # All loads are constant and nothing is damped: torque times angle, exact.
+        # All loads are constant and there are no dampers. Torque times angle is exact.
         turned, torques = angles - angles[:1], scene.load_segments[0].values
         exact: Array = torques[ROTOR_TORQUE] * turned[:, 0]
         for moment in prescribed_moments(scene):
@@ -301,9 +306,10 @@ def work(scene: Scene, time: Array, angles: Array, rates: Array) -> Array:
                 exact = exact + torques[moment.load] * turned[:, moment.coordinate]
         return exact
 
-    # The power jumps with a load, so that no polynomial may go through both sides of a jump.
+    # The power jumps with a load, and no polynomial may go through both sides of a jump. Therefore
+    # each segment is integrated separately.
     out, done = np.zeros(len(time)), 0.0
-    # s, the distance by which rounding may put a row beside a jump.
+    # Largest distance, s, that a row at a jump may have from it because of rounding.
     slack = 1e-9 * scene.duration / (scene.samples - 1)
     for segment in scene.load_segments:
         first, last = np.searchsorted(time, [segment.start - slack, segment.end + slack])
@@ -317,12 +323,12 @@ def work(scene: Scene, time: Array, angles: Array, rates: Array) -> Array:
 
 
 def power(scene: Scene, segment: Segment, time: Array, rates: Array) -> Array:
-    """Return the power that `work` is the integral of, (n,) W.
+    """Return the power of torques and dampers, whose integral is `work`, (n,) W.
 
     Parameters
     ----------
     scene : the rotor.
-    segment : the loads.
+    segment : segment of the run, with the loads.
     time : (n,) s within the segment.
     rates : (n, 1 + blades) rad/s.
     """
@@ -333,26 +339,26 @@ def power(scene: Scene, segment: Segment, time: Array, rates: Array) -> Array:
 
 
 def cumulative_integral(time: Array, values: Array) -> Array:
-    """Integrate sampled values from the first row to each row, (n,).
+    """Return the integral of sampled values from the first row to each row, (n,).
 
-    Each interval is integrated by the polynomial through the eight nearest rows, which need not be
-    equally spaced; this polynomial exactly, by Gauss and Legendre's points.
+    Between two rows the integrand is the polynomial through the eight nearest rows, which need not
+    be equally spaced. Gauss-Legendre quadrature integrates this polynomial exactly.
 
     Parameters
     ----------
     time : (n,) s, increasing.
-    values : (n,) integrand.
+    values : (n,) integrand in each row.
     """
     points = min(POLYNOMIAL_ROWS, len(time))
-    # The rows that the polynomial of each interval goes through: equally many on both sides, but
-    # near the ends.
+    # The polynomial between two rows goes through equally many rows on both sides, except near the
+    # ends.
     first = np.clip(np.arange(len(time) - 1) - (points // 2 - 1), 0, len(time) - points)
     window = first[:, None] + np.arange(points)
     nodes, known = time[window], values[window]
     abscissae, weights = np.polynomial.legendre.leggauss((points + 1) // 2)
     half = 0.5 * np.diff(time)
     at = (time[:-1] + half)[:, None] + half[:, None] * abscissae
-    # In Lagrange's form: basis j is one at node j and zero at the others.
+    # The polynomial in Lagrange's form: basis function j is 1 at node j and 0 at all other nodes.
     polynomial = np.zeros_like(at)
     for j in range(points):
         basis = np.ones_like(at)

@@ -31,7 +31,7 @@ _NODE = Ref("node", "joint angles")
 
 
 def parts(scene: Scene, loads: Loads) -> list[Part]:
-    """Return everything the engine has of a scene, in the order it is built.
+    """Return all parts of the engine's system for a scene, in the order in which they are added.
 
     Parameters
     ----------
