@@ -1,6 +1,6 @@
 """List the methods of MuJoCo: one model with three of the engine's integrators.
 
-Importing this does not import MuJoCo.
+Importing this module does not import MuJoCo.
 """
 
 from __future__ import annotations
@@ -29,21 +29,21 @@ class Rk4Settings(Settings):
 
 @dataclass(frozen=True)
 class FirstOrderSettings(Settings):
-    """Semi-implicit Euler, dampers at the end of the step.
+    """Semi-implicit Euler, with the forces of dampers at the end of the step.
 
-    The method `implicit` takes Coriolis forces there, too.
+    The method `implicit` takes the Coriolis forces, too, at the end of the step.
     """
 
     step: float = step(5e-5)
 
 
 def _items(scene: Scene) -> list[BuiltItem]:
-    """Return the items of a scene.
+    """Return the items of a scene's model.
 
     Raises
     ------
     MethodRefusal
-        If MuJoCo is not installed, with the way to get it.
+        If MuJoCo is not installed. The message has the command that installs it.
     """
     if not METHODS[0].is_installed:
         raise MethodRefusal(f"MuJoCo is not installed: {_HINT}")
@@ -59,12 +59,12 @@ def _build(integrator: str, scene: Scene, settings: Rk4Settings | FirstOrderSett
     ----------
     integrator : a key of `mjcf.INTEGRATORS`.
     scene : the run.
-    settings : of the method, of which the step is used.
+    settings : settings of the method.
 
     Raises
     ------
     MethodRefusal
-        If MuJoCo is not installed, or does not take the model.
+        If MuJoCo is not installed, or rejects the model.
     """
     _items(scene)
     from rotor_mbs.models.mujoco.solver import MujocoSolver
@@ -78,8 +78,8 @@ def _method(integrator: str, label: str, **facts: Any) -> Method:
     Parameters
     ----------
     integrator : a key of `mjcf.INTEGRATORS`.
-    label : of the integrator.
-    facts : other fields of the `Method`.
+    label : label of the integrator.
+    facts : values of other fields of the `Method`.
     """
     return Method(
         name=f"mujoco/{integrator}",
@@ -103,9 +103,11 @@ METHODS = (
         ladders=(step_ladder(10),),
         linearize=lazy("rotor_mbs.models.mujoco.solver:linearize"),
     ),
-    # First the new rates, with forces at the start of the step and dampers at its end; then angles
-    # with these rates. The ladders of these first-order methods begin at steps that still resolve
-    # the motion. The engine's Euler treats dampers alike, and gives the same bits as implicitfast.
+    # Both methods first compute the new rates, with most forces at the start of the step and those
+    # of dampers at its end. They then compute the new angles from the new rates. Their order is 1,
+    # so their ladders begin with smaller steps, which still resolve the motion. The engine's
+    # integrator Euler is left out: it treats dampers in the same way, and gives the same bits as
+    # implicitfast.
     *(
         _method(
             integrator,

@@ -11,11 +11,12 @@ the control u its slope in N m/s. So a torque that is linear in time enters ever
 the stage's own time. A spring's rest angle is its `springref` where it is constant; where it
 changes, it is the activation (rad) of an actuator whose gain is the spring's stiffness.
 
-MuJoCo compiles no moving body whose mass or one of whose principal moments is 1e-15 or less: in
-this text a point mass, and a hub without inertia, have `LEAST`. `solver.Engine` sets them to zero
-in the compiled model. A file that MuJoCo itself loads keeps them, an error of LEAST / J for a
-blade's moment J about its pitch axis: below round-off for the paper's blade (J = 110 kg m²), but
-1e-5 for a small model of 1 g with J = 2.5e-10 kg m².
+MuJoCo compiles no moving body whose mass or one of whose principal moments is 1e-15 or less. In
+the MJCF text such a mass or moment, as of a point mass or a hub without inertia, is therefore
+`LEAST`. `solver.Engine` sets these values to zero in the compiled model. If MuJoCo itself loads a
+file, the values remain. They cause a relative error LEAST / J of the moment J of a blade about its
+pitch axis: below round-off for the paper's blade (J = 110 kg m²), but 1e-5 for a small model of 1 g
+with J = 2.5e-10 kg m².
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ from rotor_mbs.scenario.time_table import (
     torque_place,
 )
 
-LEAST = 2e-15  # kg, kg m²
+LEAST = 2e-15  # smallest mass (kg) and principal moment (kg m²) in the text
 
 INTEGRATORS = {"rk4": "RK4", "implicitfast": "implicitfast", "implicit": "implicit"}
 _FILE_STEP = 2.5e-4  # s, the largest time step of a file: the default of mujoco/rk4
@@ -51,10 +52,10 @@ class Load:
 
     Attributes
     ----------
-    name : of the actuator.
-    coordinate : 0 for the rotor, then the pitches.
+    name : name of the actuator.
+    coordinate : 0 for the rotor, i for the pitch of blade i.
     gain : 1, or the stiffness (N m/rad) of a spring whose rest angle (rad) changes over time.
-    place : of the load in `Scene.load_tables`.
+    place : place of the load in `Scene.load_tables`.
     """
 
     name: str
@@ -74,8 +75,8 @@ class Load:
 def loads_of(scene: Scene) -> list[Load]:
     """Return the actuators of a scene, one for each load that needs one.
 
-    First the torque on the rotor, then for each pitch that moves its torque, and the rest angle of
-    its spring where that changes over time.
+    The first actuator is the torque on the rotor. For each pitch that moves, the torque and the
+    spring's rest angle follow. A rest angle needs an actuator only if it changes over time.
 
     Parameters
     ----------
@@ -179,8 +180,8 @@ def _blade(hub: ET.Element, scene: Scene, number: int) -> None:
     Parameters
     ----------
     hub : the element of the hub's body.
-    scene : the rotor; the tip is added where it is an output.
-    number : of the blade, from 1.
+    scene : the rotor. The tip is added if it is an output of the scene.
+    number : number of the blade, from 1.
     """
     blade, phase = scene.blades[number - 1], scene.phases[number - 1]
     pitch = 0.0 if blade.has_pitch_inertia else scene.initial_angles[number]
@@ -222,8 +223,8 @@ def _joint(
     Parameters
     ----------
     body : the element.
-    coordinate : 0 for the rotor, then the pitches.
-    axis : of the hinge, as MJCF writes a vector.
+    coordinate : 0 for the rotor, i for the pitch of blade i.
+    axis : axis of the hinge, as MJCF writes a vector.
     stiffness, damping : N m/rad and N m s/rad.
     rest : rad, the spring's rest angle.
     """
@@ -269,16 +270,16 @@ def _possible(moments: list[float]) -> list[float]:
 
 
 def numbers(*values: float) -> str:
-    """Return numbers with all their digits, as an attribute has them."""
+    """Return numbers with all their digits, as the text of an MJCF attribute."""
     return " ".join(repr(float(value)) for value in values)
 
 
 def mjcf_file(scene: Scene) -> str:
     """Return the MJCF text of a scene for plain MuJoCo.
 
-    Its step is a whole part of the sample interval. The keyframe "start" has the initial state and
-    the loads at t = 0; a numeric "segment i" has the time, torques or rest angles, and slopes of
-    each segment; the capsules only show the blades.
+    Its step is the sample interval divided by a whole number. The keyframe "start" has the initial
+    state and the loads at t = 0. The numeric "segment i" has the start time of segment i, and its
+    loads (torques or rest angles) with their slopes. The capsules only show the blades.
 
     Parameters
     ----------
@@ -327,7 +328,7 @@ def _header(scene: Scene, steps: int, has_loads: bool) -> str:
     Parameters
     ----------
     scene : gives title, samples and duration.
-    steps : from one sample to the next.
+    steps : number of steps from one sample to the next.
     has_loads : whether the model has actuators.
     """
     lines = [

@@ -1,6 +1,6 @@
-"""Run the rotor in MuJoCo from sample to sample, read its bodies, and linearize the model.
+"""Integrate the rotor in MuJoCo from sample to sample, compute its outputs, and linearize it.
 
-The only module that imports MuJoCo.
+No other module imports MuJoCo.
 """
 
 from __future__ import annotations
@@ -37,37 +37,39 @@ from rotor_mbs.solution.trajectory import (
     scene_at,
 )
 
-# The engine's types are compiled. Without this, it writes its warnings to a file in the working
-# folder.
+# The engine is a compiled module, and is not type-checked. Without a handler of warnings it writes
+# its warnings to a file in the working folder.
 _engine: Any = mujoco
 _engine.set_mju_user_warning(lambda _message: None)
 
-# Of positions, velocities and accelerations that are not finite or huge.
+# The engine's warnings of positions, velocities and accelerations that are huge or not finite.
 _BAD_STATE_WARNINGS = (
     _engine.mjtWarning.mjWARN_BADQPOS,
     _engine.mjtWarning.mjWARN_BADQVEL,
     _engine.mjtWarning.mjWARN_BADQACC,
 )
 
-# Steps in one call, a few hundredths of a second: the engine checks neither signals nor the time
-# limit in between.
+# Largest number of steps in one call of the engine. Such a call takes a few hundredths of a second.
+# Neither signals nor the time limit are checked during a call.
 _PORTION = 10_000
 
 
 @dataclass
 class Poses:
-    """Hold the motion of all bodies and sites at n states, in the world frame.
+    """Hold the motion of all bodies and sites at n states.
 
     The world body is left out.
 
     Attributes
     ----------
-    centre, velocity : (n, bodies, 3) m and m/s, of the centres of mass.
-    spin : (n, bodies, 3) rad/s, along the principal axes.
-    site : (n, sites, 3) m.
-    acceleration : (n, coordinates) rad/s².
-    frame : (n, bodies, 3, 3) from a body's frame to the world frame.
-    wrench : (n, bodies, 6) N m about the world's origin and N, of a body's parent on the body.
+    centre : (n, bodies, 3) m, centres of mass in the world frame.
+    velocity : (n, bodies, 3) m/s, velocities of the centres of mass, along the principal axes.
+    spin : (n, bodies, 3) rad/s, angular velocities, along the principal axes.
+    site : (n, sites, 3) m, positions of the sites in the world frame.
+    acceleration : (n, coordinates) rad/s², accelerations of the coordinates.
+    frame : (n, bodies, 3, 3) rotations from the body's frame to the world frame.
+    wrench : (n, bodies, 6) moment (N m) about the world's origin, then force (N), that the body's
+        parent exerts on the body, in the world frame.
     """
 
     centre: Array
@@ -82,7 +84,7 @@ class Poses:
 class Engine:
     """Hold the compiled model of a scene, and its state.
 
-    Masses and moments of `mjcf.LEAST` are set to zero.
+    Masses and moments of inertia that are `mjcf.LEAST` in the text are zero in the model.
     """
 
     def __init__(self, scene: Scene, integrator: str, step: float) -> None:
@@ -90,12 +92,12 @@ class Engine:
 
         Parameters
         ----------
-        scene, integrator, step : as of `mjcf.model`.
+        scene, integrator, step : as for `mjcf.model`.
 
         Raises
         ------
         MethodRefusal
-            If MuJoCo does not take the model, with its reason.
+            If MuJoCo rejects the model. The message has MuJoCo's reason.
         """
         try:
             self._model = _engine.MjModel.from_xml_string(
@@ -130,14 +132,16 @@ class Engine:
         ----------
         step : s.
         steps : number of steps.
-        loads, slopes : (actuators,) activation at the start, N m or rad, and its slope per s.
+        loads, slopes : (actuators,) activation of each actuator at the start (N m or rad), and its
+            slope (N m/s or rad/s).
 
         Returns
         -------
         taken : int
             Number of steps taken.
         message : str
-            Why it ended before all were taken: time limit, or a state that is not finite; else "".
+            The reason if not all steps were taken: the time limit, or a state that is not finite.
+            Otherwise "".
         """
         model, data = self._model, self._data
         model.opt.timestep = step
@@ -191,11 +195,12 @@ class Engine:
         motion = np.empty((model.nbody - 1, 6))
         for body, velocity in enumerate(motion, start=1):
             _engine.mj_objectVelocity(model, data, _engine.mjtObj.mjOBJ_BODY, body, velocity, 1)
-        # Copies, because the next call computes other numbers in their place.
+        # These arrays are copied, because the engine overwrites them at the next state.
         centres, sites = data.xipos[1:].copy(), data.site_xpos.copy()
         accelerations = data.qacc.copy()
         frames = data.xmat[1:].reshape(-1, 3, 3).copy()
-        # The engine gives moments about the centre of mass of a body's whole tree.
+        # The engine's moments are about the centre of mass of a body's whole tree. They are changed
+        # to moments about the world's origin.
         _engine.mj_rnePostConstraint(model, data)
         wrench = np.array(data.cfrc_int[1:])
         wrench[:, :3] += np.cross(data.subtree_com[model.body_rootid[1:]], wrench[:, 3:])
@@ -203,23 +208,26 @@ class Engine:
         return centres, velocities, spins, sites, accelerations, frames, wrench
 
 
-# rad, rad/s: steps of the difference quotients of `linearize`, whose error is a power series of the
-# step's square.
+# Steps of the central difference quotients in `linearize`, rad and rad/s. The error of a quotient
+# is a power series of the square of the step.
 _STEPS = (1e-3, 2e-3, 4e-3, 8e-3)
 
-# Evaluations of the equations of motion in a step.
+# Number of evaluations of the equations of motion in a step, by integrator.
 _STAGES = {"rk4": 4, "implicitfast": 1, "implicit": 1}
 
 
 class _Row(NamedTuple):
-    """Hold a state of the run. Where a load jumps there are two, with the segment before and after.
+    """Hold a state of the run.
+
+    At a kink or jump of a load there are two rows: one with the segment before it, and one with the
+    segment after it.
 
     Attributes
     ----------
     time : s.
     angles, rates : (coordinates,) rad and rad/s.
-    segment : the loads.
-    is_sample : whether a sample is there.
+    segment : the segment with the loads.
+    is_sample : whether the row is a sample.
     """
 
     time: float
@@ -230,7 +238,7 @@ class _Row(NamedTuple):
 
 
 class MujocoSolver:
-    """Run the model of a scene by one of MuJoCo's integrators; see `methods.base.Solver`."""
+    """Integrate a scene by one of MuJoCo's integrators; see `methods.base.Solver`."""
 
     def __init__(self, scene: Scene, integrator: str, step: float) -> None:
         """Build the model.
@@ -244,7 +252,7 @@ class MujocoSolver:
         Raises
         ------
         MethodRefusal
-            As `Engine`.
+            If MuJoCo rejects the model.
         """
         self._scene, self._step, self._stages = scene, step, _STAGES[integrator]
         self._moving = scene.moving_coordinates
@@ -277,11 +285,18 @@ class MujocoSolver:
         )
 
     def _advance(self, interval: Interval) -> tuple[int, str]:
-        """Integrate over one interval; return the steps taken, and why it ended early or "".
+        """Integrate over one interval.
 
         Parameters
         ----------
-        interval : on which all loads are linear.
+        interval : the interval, on which all loads are linear.
+
+        Returns
+        -------
+        taken : int
+            Number of steps taken.
+        message : str
+            The reason if the end of the interval was not reached; otherwise "".
         """
         span, segment = interval.end - interval.start, interval.segment
         steps, count = steps_and_rows(span, self._step, self._rows_between)
@@ -302,7 +317,7 @@ class MujocoSolver:
         return [load.activation(segment, time) for load in self._loads]
 
     def _keep(self, time: float, segment: Segment, is_sample: bool) -> None:
-        """Keep the engine's state."""
+        """Keep the engine's state as a row."""
         angles, rates = self.engine.state
         self._rows.append(_Row(time, angles.copy(), rates.copy(), segment, is_sample))
 
@@ -316,7 +331,8 @@ class MujocoSolver:
         at = [i for i, row in enumerate(rows) if row.is_sample]
         fields: dict[str, Array] = {}
         fields["angles"], fields["rates"] = all_coordinates(scene, angles[at], rates[at])
-        # A diverging state may overflow; the samples are cut where they stop being finite.
+        # The energies of a diverging state may overflow. The samples end before the first that is
+        # not finite.
         with np.errstate(over="ignore", invalid="ignore"):
             if {"tip", "energy", "loads"} & set(scene.outputs):
                 values = np.array([self._activations(row.segment, row.time) for row in rows])
@@ -326,7 +342,7 @@ class MujocoSolver:
             if scene.wants("energy"):
                 masses, moments = self.engine.masses, self.engine.moments
                 twice = masses[:, None] * poses.velocity**2 + moments * poses.spin**2
-                # zero at the height of the apex
+                # Potential energy of the weights: zero at the height of the apex.
                 weights = scene.gravity * (poses.centre[:, :, 2] @ masses)
                 springs, of_rests = _springs(scene, fields["angles"])
                 work = self._work(angles, rates, poses.acceleration, values)
@@ -339,24 +355,25 @@ class MujocoSolver:
         return finite_samples(scene, fields)
 
     def _root_loads(self, poses: Poses, values: Array) -> dict[str, Array]:
-        """Return the loads at roots and shaft by quantity: what its parent exerts on each body.
+        """Return the loads at roots and shaft in all rows, by name of the quantity.
 
-        The moment of an actuator is the part about the pitch axis.
+        The loads are what the parent of each body exerts on the body. The shaft moment is without
+        the rotor torque. The moment of a pitch actuator is the root moment about the pitch axis.
 
         Parameters
         ----------
-        poses : at all rows.
+        poses : motion and loads of the bodies in all rows.
         values : (rows, actuators) activations, N m or rad.
         """
         moment, force = poses.wrench[:, :, :3], poses.wrench[:, :, 3:]
-        # In the frame of each body; the first is the hub.
+        # Force and moment of each blade in its own frame. The first body, the hub, is left out.
         root_forces = np.einsum("nbij,nbi->bnj", poses.frame, force)[1:]
         root_moments = np.einsum("nbij,nbi->bnj", poses.frame, moment)[1:]
-        if self._scene.hub_radius:  # from the apex to the root
+        if self._scene.hub_radius:  # the moments are changed from the apex to the root
             root_moments = root_moments - np.cross([0.0, 0.0, self._scene.hub_radius], root_forces)
         shaft_moment = moment[:, 0].copy()
         if self._scene.has_torque:
-            torque = values[:, 0]  # the first of `mjcf.loads_of`
+            torque = values[:, 0]  # the first load of `mjcf.loads_of`
             if self._scene.shaft_tilt:
                 # along the hub's own y axis
                 shaft_moment -= torque[:, None] * poses.frame[:, 0, :, 1]
@@ -369,11 +386,11 @@ class MujocoSolver:
         )
 
     def _work(self, angles: Array, rates: Array, accelerations: Array, values: Array) -> Array:
-        """Compute the work of the actuators less what the dampers took, (rows,) J.
+        """Compute the work of the actuators minus the energy that the dampers dissipate, (rows,) J.
 
-        For constant loads without dampers it is torque times angle. Else the power P is integrated
-        from row to row by ∫ P dt ≈ h (P₀ + P₁)/2 + h² (P₀' - P₁')/12, of order 4 like the best
-        integrator here.
+        If loads are constant and there are no dampers, the work is torque times angle. Otherwise
+        the power P is integrated from row to row by ∫ P dt ≈ h (P₀ + P₁)/2 + h² (P₀' - P₁')/12.
+        This quadrature is of order 4, like rk4, the integrator of the highest order here.
 
         Parameters
         ----------
@@ -391,10 +408,10 @@ class MujocoSolver:
         slopes = gains * np.array(controls).reshape(values.shape)
         power = (torques * rates[:, columns]).sum(axis=1)
         power = power - (dampings * rates**2).sum(axis=1)
-        # Its time derivative.
+        # Time derivative of the power.
         change = (slopes * rates[:, columns] + torques * accelerations[:, columns]).sum(axis=1)
         change -= 2.0 * (dampings * rates * accelerations).sum(axis=1)
-        # Where a load jumps there are two rows of one time, and a part of length zero between them.
+        # Where two segments meet, two rows have the same time. The time between them is zero.
         h = np.diff([row.time for row in self._rows])
         trapezoids = 0.5 * h * (power[1:] + power[:-1])
         parts = trapezoids + h * h / 12.0 * (change[:-1] - change[1:])
@@ -402,9 +419,10 @@ class MujocoSolver:
 
 
 def _springs(scene: Scene, angles: Array) -> tuple[Array, Array]:
-    """Compute the energy of the springs, and the work of rest angles that actuators did not do.
+    """Compute the energy of the springs, and the work of rest angles that actuators leave out.
 
-    The work of a rest angle r that changes is -∫ k (θ - r) dr; its actuator did ∫ k r dθ.
+    The work of a rest angle r that changes is -∫ k (θ - r) dr. The work of its actuator is
+    ∫ k r dθ. The difference of the two is the change of ½ k r (r - 2θ).
 
     Parameters
     ----------
@@ -413,8 +431,10 @@ def _springs(scene: Scene, angles: Array) -> tuple[Array, Array]:
 
     Returns
     -------
-    energy, work : ndarray, shape (n,)
-        J.
+    energy : ndarray, shape (n,)
+        Energy of the springs, J.
+    work : ndarray, shape (n,)
+        Work to be added to that of the actuators, J.
     """
     energy, work = np.zeros((2, len(angles)))
     for number in scene.moving_coordinates[1:]:
@@ -436,15 +456,15 @@ def linearize(
 
     Parameters
     ----------
-    scene : the rotor.
+    scene : the rotor. Its loads have their values at t = 0.
     angles : (1 + blades,) rad.
-    speed : rad/s, of the rotor.
-    torque : N m, on the rotor.
+    speed : rate of the rotor, rad/s.
+    torque : constant torque on the rotor, N m.
 
     Raises
     ------
     MethodRefusal
-        Where the engine does not take the model.
+        If MuJoCo rejects the model.
     """
     state = scene_at(scene, angles, speed, torque)
     columns = state.moving_coordinates

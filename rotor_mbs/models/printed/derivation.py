@@ -4,8 +4,9 @@ They follow from the paper's matrices, for any number of blades. E3 is in (53)-(
 one blade, is printed with the square of the pitch rate. The coefficient of that term is zero once
 E2 is corrected.
 
-First the transformation matrix (3) and its derivatives as printed, from sines and cosines of q2, q3
-(numbers, arrays or symbols) and the lengths c, d; the constants d1, d2 of (2), (3) are zero.
+The first functions return the transformation matrix (3) and its derivatives as printed. Their
+arguments are sines and cosines of q2, q3 (numbers, arrays or symbols) and the lengths c, d. The
+constants d1, d2 of (2), (3) are zero.
 """
 
 from __future__ import annotations
@@ -131,7 +132,7 @@ class BladeTerms(NamedTuple):
 def trace(u: Matrix, m: float, v: Matrix) -> float:
     """Return the trace of U J3 Vᵀ in (24) and (26).
 
-    J3 of (20) is that of a point mass m (kg) in frame 3's origin.
+    J3 of (20) is the inertia matrix of a point mass m (kg) in the origin of frame 3.
     """
     u0, u1, u2, _ = u  # the last row of a derivative is zero
     v0, v1, v2, _ = v

@@ -1,9 +1,10 @@
 """Evaluate the paper's equations of motion as printed: (33) for one blade, (39)-(56) for three.
 
-(33) with (25), (29), (30), (32). Nothing is corrected here: E1 and E2 are in the coefficients, E3
-in the last terms of (53)-(55). Every formula is a function of the symbols it is printed with, so
-that its numbers and its text have one source. It is run in the order of the print, with one
-exception: the factor of the first row of (56) is multiplied in, see `rotor_gravity`.
+The terms of (33) are (25), (29), (30) and (32). Nothing is corrected here: E1 and E2 are in the
+coefficients, E3 in the last terms of (53)-(55). Every formula is a function of the symbols it is
+printed with, so that its numbers and its text have one source. Formulas are evaluated in the order
+of the print, with one exception: the factor of the first row of (56) is multiplied in, see
+`rotor_gravity`.
 
 s2, c2 .. s5, c5   sines and cosines of q2 (rotor), q3, q4, q5 (pitch of blade 1, 2, 3)
 w22, w23, w33, ..  products of rates: w23 = q̇2 q̇3, w33 = q̇3²
@@ -11,9 +12,9 @@ w3, w4, w5         rates to the first power, w3 = q̇3, printed in (53)-(55)
 m, c, d, g         mass (kg) and place (c, 0, d) (m) of the point mass; gravity (m/s²) along -z
 root3              the square root of 3
 
-Where the machine reading of the print is damaged, the undamaged equation it follows from tells what
-was printed: (54), (55) are (30) at q2 + 2π/3 and q2 + 4π/3 by (35), (36); the pitch rows of (56)
-are (32) at the same angles.
+Some equations are damaged in the machine-readable text of the paper. What was printed then follows
+from an undamaged equation: (54), (55) are (30) at q2 + 2π/3 and q2 + 4π/3 by (35), (36); the pitch
+rows of (56) are (32) at the same angles.
 """
 
 from __future__ import annotations
@@ -203,7 +204,8 @@ def rotor_gravity(
 
     Rounding decides Fig. 5, which starts at rest in an unstable equilibrium: the printed bracket is
     exactly zero there, and nothing moves; the three terms leave -4.2e-13 N m, with which the
-    published numbers come out for T = 12 s. Other ways: reference/claims.json.
+    published numbers come out for T = 12 s. Results of other ways to evaluate the row are in
+    reference/claims.json.
     """
     second, third = c2 / 2 + root3 / 2 * s2, c2 / 2 - root3 / 2 * s2
     return -c * m * g * c2 * c3 + c * m * g * second * c4 + c * m * g * third * c5
@@ -254,8 +256,8 @@ def three_blade_accelerations(
 ) -> tuple[float, float, float, float]:
     """Solve (39)-(56) for q̈2..q̈5 in rad/s².
 
-    By (39)-(41) each pitch row holds q̈2 and its own pitch only, so the pitches are eliminated one
-    by one.
+    By (39)-(41) each pitch row has only q̈2 and the acceleration of its own pitch. Therefore the
+    pitches are eliminated one by one.
 
     Parameters
     ----------

@@ -1,6 +1,7 @@
-"""List the methods that run the paper's equations by ode45.
+"""List the methods that integrate the paper's equations by ode45.
 
-printed/ode45 runs them as printed; printed_e1, _e2, _e3/ode45 have one erratum alone.
+printed/ode45 integrates the equations as printed. printed_e1/ode45, printed_e2/ode45 and
+printed_e3/ode45 integrate the corrected equations with one of the errata E1, E2, E3.
 """
 
 from __future__ import annotations
@@ -17,19 +18,20 @@ from rotor_mbs.models import Ode45Settings, equation_items
 from rotor_mbs.models.printed import literal
 from rotor_mbs.models.printed.derivation import DerivedRotor, Errata
 
-if TYPE_CHECKING:  # the list of methods needs none of them
+if TYPE_CHECKING:  # the list of methods needs none of these modules
     from rotor_mbs.models.ode45 import Ode45Result, RightHandSide
     from rotor_mbs.models.printed.observables import PointMassRotor
     from rotor_mbs.scenario.scene import Scene
     from rotor_mbs.scenario.time_table import LoadTable
     from rotor_mbs.solution.trajectory import Integration, Trajectory
 
-# (torques in N m, angles and rates) -> accelerations; all of the coordinates that move.
+# (torques, angles followed by rates) -> accelerations. All are of the coordinates that move, and in
+# N m, rad, rad/s and rad/s².
 Accelerations = Callable[[Sequence[float], Sequence[float]], Sequence[float]]
 
 
 class PrintedSolver:
-    """Integrate by ode45 the equations as printed or, with errata, the paper's derivation."""
+    """Integrate the equations as printed, or derived anew with some errata, by ode45."""
 
     def __init__(
         self, name: str, errata: Errata | None, scene: Scene, settings: Ode45Settings
@@ -38,8 +40,8 @@ class PrintedSolver:
 
         Parameters
         ----------
-        name : of the method.
-        errata : the errata that are left in, where the equations are derived anew; None as printed.
+        name : name of the method.
+        errata : errata of equations that are derived anew; None for the equations as printed.
         scene : the run.
         settings : the tolerances.
 
@@ -54,7 +56,7 @@ class PrintedSolver:
         self._initial = [*scene.initial_angles[:moving], *scene.initial_rates[:moving]]
         self._right_hand_side = right_hand_side(scene, equations(rotor, errata), moving)
         self._tolerances = settings.relative_tolerance, settings.absolute_tolerance
-        self._result: Ode45Result  # of the last integration
+        self._result: Ode45Result  # result of the last integration
 
     def integrate(self) -> Integration:
         """Integrate from the initial state to the end, or to the first failure."""
@@ -76,7 +78,7 @@ class PrintedSolver:
     def observe(self) -> Trajectory:
         """Return the samples of the last integration.
 
-        As printed, with nothing corrected, ode45's own output points are returned beside them.
+        For the equations as printed, the trajectory also has ode45's own output points (`refined`).
         """
         import numpy as np
 
@@ -99,9 +101,9 @@ class PrintedSolver:
                 if table:
                     fields["work"] += torque_work(scene, result, coordinate, time)
         if scene.wants("loads"):
-            before = np.nextafter(time, 0.0).tolist()  # where a torque jumps, the value before it
+            before = np.nextafter(time, 0.0).tolist()  # at a jump of a torque: before the jump
             torque = np.array([scene.torque_at(t) for t in before])
-            # Zero for pitches that are fixed.
+            # The accelerations of fixed pitches are zero.
             accelerations = np.zeros((len(time), len(scene.initial_angles)))
             for row, t, state in zip(accelerations, before, states.tolist(), strict=True):
                 row[: self._moving] = self._right_hand_side(t, state)[self._moving :]
@@ -116,18 +118,18 @@ class PrintedSolver:
 
 
 def point_mass_rotor(name: str, errata: Errata | None, scene: Scene) -> PointMassRotor:
-    """Return the printed symbols of a scene.
+    """Return the values of the paper's symbols for a scene.
 
     Parameters
     ----------
-    name : of the method.
-    errata : the errata that are left in, where the equations are derived anew; None as printed.
+    name : name of the method.
+    errata : errata of equations that are derived anew; None for the equations as printed.
     scene : the rotor.
 
     Raises
     ------
     MethodRefusal
-        If the scene has something that the printed equations cannot represent, in one sentence.
+        If the equations cannot represent the scene. The message says why, in one sentence.
     """
     from rotor_mbs.models.printed.observables import PointMassRotor
 
@@ -154,18 +156,18 @@ def point_mass_rotor(name: str, errata: Errata | None, scene: Scene) -> PointMas
     for sentence, refused in refusals.items():
         if refused:
             raise MethodRefusal(sentence)
-    # Frame 3 has its origin in the mass.
+    # The tip is given in frame 3, whose origin is the point mass.
     tip = (blade.tip[0] - x, blade.tip[1] - y, blade.tip[2] - z)
     return PointMassRotor(blade.mass, x, z, scene.gravity, scene.phases, tip)
 
 
 def equations(rotor: PointMassRotor, errata: Errata | None) -> Accelerations:
-    """Return the equations of motion: as printed or, with errata, derived anew with these.
+    """Return the equations of motion, as printed or derived anew with some errata.
 
     Parameters
     ----------
-    rotor : the printed symbols.
-    errata : the errata that are left in; None as printed.
+    rotor : values of the paper's symbols.
+    errata : errata of equations that are derived anew; None for the equations as printed.
     """
     m, c, d, g = rotor.m, rotor.c, rotor.d, rotor.g
     if not rotor.pitches_move:
@@ -182,16 +184,16 @@ def equations(rotor: PointMassRotor, errata: Errata | None) -> Accelerations:
 
 
 def items(name: str, errata: Errata | None, scene: Scene) -> list[BuiltItem]:
-    """Return the terms of a scene, and the numbers of the paper's equations that are run.
+    """Return equations, terms and outputs of a scene, with the numbers of the paper's equations.
 
     Parameters
     ----------
-    name, errata, scene : as of `point_mass_rotor`.
+    name, errata, scene : as for `point_mass_rotor`.
 
     Raises
     ------
     MethodRefusal
-        As `point_mass_rotor`.
+        If the equations cannot represent the scene.
     """
     point_mass_rotor(name, errata, scene)
     if errata:
@@ -205,7 +207,7 @@ def items(name: str, errata: Errata | None, scene: Scene) -> list[BuiltItem]:
 
 
 def _torque_tables(scene: Scene, moving: int) -> tuple[LoadTable, ...]:
-    """Return τ2, then τ3 to τ5, over time, of the `moving` coordinates."""
+    """Return the torques over time on the first `moving` coordinates: τ2, then τ3 to τ5."""
     from rotor_mbs.scenario.time_table import torque_place
 
     return tuple(scene.load_tables[torque_place(coordinate)] for coordinate in range(moving))
@@ -214,7 +216,7 @@ def _torque_tables(scene: Scene, moving: int) -> tuple[LoadTable, ...]:
 def right_hand_side(scene: Scene, accelerations: Accelerations, moving: int) -> RightHandSide:
     """Return the function y' = f(t, y) of y = (angles, rates).
 
-    It gives NaN where the equations are singular.
+    The function returns NaN if the equations are singular at y.
 
     Parameters
     ----------
@@ -226,14 +228,14 @@ def right_hand_side(scene: Scene, accelerations: Accelerations, moving: int) -> 
 
     undefined = [math.nan] * (2 * moving)
     tables = _torque_tables(scene, moving)
-    # Looked up once where they are constant, as in all scenes of the paper.
+    # Constant torques are looked up only once. All scenes of the paper have constant torques.
     constant = [value_at(table, 0.0) for table in tables] if all(map(is_constant, tables)) else None
 
     def f(t: float, y: Sequence[float]) -> list[float]:
         torques = constant or [value_at(table, t) for table in tables]
         try:
             return [*y[moving:], *accelerations(torques, y)]
-        # ValueError is that of the sine of an infinite angle.
+        # The sine of an infinite angle raises ValueError.
         except (ZeroDivisionError, OverflowError, ValueError):
             return undefined
 
@@ -245,9 +247,9 @@ def _method(name: str, label: str, errata: Errata | None = None, erratum: str = 
 
     Parameters
     ----------
-    name, label : of the method.
-    errata : the errata that are left in, where the equations are derived anew.
-    erratum : the one that the method is about; "" as printed.
+    name, label : name and label of the method.
+    errata : errata of equations that are derived anew; None for the equations as printed.
+    erratum : name of the only erratum, such as "E1"; "" for the equations as printed.
     """
     return Method(
         name=name,

@@ -1,7 +1,8 @@
-"""Compute tip path, energies, work and loads of the printed model's motion by the paper's (3).
+"""Compute tip path, energies, work and loads of the printed model's motion.
 
-Energies and loads are the physical ones, whatever equations made the motion: they show how much
-energy those equations produce, and how large their fictitious moments are.
+All follow from the paper's transformation matrix (3). Energies and loads are those of a real rotor
+with this motion, even if the motion follows from erroneous equations. They show how much energy
+such equations produce, and how large their fictitious moments are.
 """
 
 from __future__ import annotations
@@ -18,23 +19,23 @@ from rotor_mbs.scenario.time_table import torque_place, values_at, values_before
 from rotor_mbs.solution.quantities import named_loads
 from rotor_mbs.solution.trajectory import Array
 
-# Gauss's three points in [0, 1]: exact to degree five, so for a quartic interpolant.
+# The three Gauss points in [0, 1] and their weights. The quadrature is exact up to degree five, and
+# therefore for the interpolant of ode45, which has degree four.
 _GAUSS_POINTS = 0.5 + np.sqrt(0.15) * np.array([-1.0, 0.0, 1.0])
 _GAUSS_WEIGHTS = np.array([5.0, 8.0, 5.0]) / 18.0
 
 
 @dataclass(frozen=True, slots=True)
 class PointMassRotor:
-    """Hold the printed symbols of a scene: equal blades, each a point mass.
+    """Hold the values of the paper's symbols for a rotor with equal blades, each a point mass.
 
     Attributes
     ----------
-    m : kg, of each blade.
-    c, d : m, the mass is at (c, 0, d) in the blade's frame.
-    g : m/s².
-    phases : (blades,) rad.
-    tip : (3,) m, the point whose path is drawn, seen from the mass in the directions of the blade
-        frame.
+    m : mass of each blade, kg.
+    c, d : place of the mass, which is at (c, 0, d) in the blade's frame, m.
+    g : gravity, m/s².
+    phases : (blades,) rad, azimuths at which the blades are mounted.
+    tip : (3,) m, place of the tip minus that of the mass, in the blade's frame.
     """
 
     m: float
@@ -48,14 +49,14 @@ class PointMassRotor:
     def pitches_move(self) -> bool:
         """Return whether the pitches move.
 
-        c = 0 takes the inertia out of (47): the pitch is then fixed (Fig. 4b).
+        If c = 0, the inertia (47) is zero, and the pitches are fixed (Fig. 4b).
         """
         return self.c != 0.0
 
     def tip_path(self, angles: Array) -> Array:
         """Return the tips' paths, (n, blades, 3) m in the base frame.
 
-        (3) is applied to the tip as frame 3 sees it.
+        The matrix (3) transforms the tip from frame 3, whose origin is the mass, to the base frame.
 
         Parameters
         ----------
@@ -71,7 +72,10 @@ class PointMassRotor:
         return np.stack(paths, axis=1)
 
     def kinetic_energy(self, angles: Array, rates: Array) -> Array:
-        """Return ½ m v², (n,) J, with v from the last columns of (8), E1 corrected, and (9)."""
+        """Return the kinetic energy ½ m v² of all blades, (n,) J.
+
+        The velocity v follows from the last columns of (8), with E1 corrected, and of (9).
+        """
         total = np.zeros(len(angles))
         for pitch, sines in enumerate(self._sines(angles), start=1):
             u32 = derivation.u32(*sines, self.c, self.d, CORRECTED)
@@ -82,7 +86,7 @@ class PointMassRotor:
         return total
 
     def potential_energy(self, angles: Array) -> Array:
-        """Return the energy of the weights, (n,) J, zero at the height of the shaft."""
+        """Return the potential energy of the weights, (n,) J; zero at the height of the shaft."""
         total = np.zeros(len(angles))
         for sines in self._sines(angles):
             height = derivation.a3(*sines, self.c, self.d)[2][3]
@@ -92,23 +96,24 @@ class PointMassRotor:
     def loads(
         self, angles: Array, rates: Array, accelerations: Array, torque: Array
     ) -> dict[str, Array]:
-        """Compute the loads at roots and shaft that the motion needs, by quantity.
+        """Compute the loads at roots and shaft that the motion needs, by name of the quantity.
 
         Parameters
         ----------
         angles, rates, accelerations : (n, 1 + blades) rad, rad/s and rad/s².
-        torque : (n,) N m, on the rotor.
+        torque : (n,) N m, torque on the rotor.
         """
         forces, moments = [], []
         shaft_force, shaft_moment = np.zeros((2, len(angles), 3))
         for pitch, sines in enumerate(self._sines(angles), start=1):
-            # (n, 3) m: the last column of (3).
+            # Place of the mass, (n, 3) m: the last column of (3).
             columns = [row[3] for row in derivation.a3(*sines, self.c, self.d)[:3]]
             place = np.stack(np.broadcast_arrays(*columns), axis=1)
             force = self._acceleration(sines, rates[:, [0, pitch]], accelerations[:, [0, pitch]])
             force[:, 2] += self.g
             force *= self.m
-            # (3, 3, n): the blade's axes in the base frame, some elements of which are plain zeros.
+            # Axes of the blade in the base frame, (3, 3, n). Some elements of (3) are plain zeros,
+            # which become arrays here.
             rotation = derivation.a3(*sines, 0.0, 0.0)[:3]
             axes = np.array([np.broadcast_arrays(*row[:3], angles[:, 0])[:3] for row in rotation])
             forces.append(np.einsum("ijn,ni->nj", axes, force))
@@ -124,12 +129,12 @@ class PointMassRotor:
     ) -> Array:
         """Return the acceleration of the mass, (n, 3) m/s², with E1 and E2 corrected.
 
-        From the last columns of (8), (9), (16)-(19).
+        It follows from the last columns of (8), (9) and (16)-(19).
 
         Parameters
         ----------
-        sines : as of `_sines`.
-        rates, accelerations : (n, 2) of q2 and q3, rad/s and rad/s².
+        sines : sines and cosines for the blade, as `_sines` returns them.
+        rates, accelerations : (n, 2) derivatives of q2 and q3, rad/s and rad/s².
         """
         c, d = self.c, self.d
         w2, w3 = rates.T
@@ -148,7 +153,7 @@ class PointMassRotor:
         return np.ascontiguousarray(acceleration.T)
 
     def _sines(self, angles: Array) -> list[tuple[Array, Array, Array, Array]]:
-        """Return s2, c2, s3, c3 of every blade, each (n,)."""
+        """Return the sines and cosines s2, c2, s3, c3 for every blade, each (n,)."""
         sines = []
         for i, phase in enumerate(self.phases):
             q2, q3 = angles[:, 0] + phase, angles[:, 1 + i]
@@ -157,35 +162,37 @@ class PointMassRotor:
 
 
 def torque_work(scene: Scene, run: Ode45Result, coordinate: int, times: Array) -> Array:
-    """Compute the work of the torque on a coordinate from angles alone.
+    """Compute the work of the torque on a coordinate, from angles alone.
 
-    Where the torque τ is linear, ∫τ q̇ dt = [τ q] - τ' ∫q dt, and the integral is exact for the
-    interpolant, a quartic in each step.
+    On an interval on which the torque τ is linear, ∫ τ q̇ dt = [τ q] - τ' ∫ q dt. The integral of q
+    is exact for the interpolant of ode45, which is of degree four in each step.
 
     Parameters
     ----------
-    scene : whose torque it is.
-    run : every step of the integration.
-    coordinate : 0 for the rotor, then the pitches.
-    times : (n,) s, increasing, that the run reached.
+    scene : the scene, with the torque.
+    run : result of the integration.
+    coordinate : 0 for the rotor, i for the pitch of blade i.
+    times : (n,) s, increasing; not later than the end of the run.
 
     Returns
     -------
     ndarray, shape (n,)
-        J done up to each of the times.
+        Work from the start of the run to each of the times, J.
     """
     if len(times) < 2:
         return np.zeros(len(times))
     place, end = torque_place(coordinate), float(times[-1])
     grid = np.unique([*run.time, *times, *scene.kink_times])
     grid = grid[grid <= end]
-    # At a jump the value before it ends one part of the grid, and the one after it begins the next.
+    # At a jump, one part of the grid ends with the torque before it, and the next part begins with
+    # the torque after it.
     before = values_before(scene.load_segments, grid[1:])[place]
     after = values_at(scene.load_tables[place], grid[:-1])
     points = grid[:-1, None] + np.diff(grid)[:, None] * _GAUSS_POINTS
     angles_at_points = run.at(points.ravel())[:, coordinate].reshape(points.shape)
     mean = angles_at_points @ _GAUSS_WEIGHTS
     angles = run.at(grid)[:, coordinate]
-    # [τ q] - τ' ∫ q dt on each part, on which τ goes linearly from `after` to `before`.
+    # Work on each part of the grid, [τ q] - τ' ∫ q dt. On a part τ is linear: it has the value
+    # `after` at the start, and `before` at the end.
     done = np.cumsum(before * (angles[1:] - mean) + after * (mean - angles[:-1]))
     return np.asarray(np.append(0.0, done)[np.searchsorted(grid, times)])
