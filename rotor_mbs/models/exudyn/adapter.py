@@ -476,8 +476,8 @@ def _settings(scheme: Scheme, coordinates: int, constraints: int) -> Any:
     settings.solution.file.write = False
     integration = settings.timeIntegration
     integration.solverType = getattr(_engine.DynamicSolverType, scheme.solver)
-    # Otherwise the engine would halve a step that fails, and then miss the sample times. So the
-    # run fails if a fixed step fails.
+    # The engine's adaptive steps are switched off. With them the engine would halve a step that
+    # fails, and miss the sample times. Without them the run fails.
     integration.adaptiveStep = False
     for path, value in scheme.options.items():
         group, _, name = path.rpartition(".")

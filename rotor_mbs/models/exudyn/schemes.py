@@ -173,8 +173,8 @@ class ChainNewmarkSettings(NewtonSettings):
     node: str = _NODE
 
 
-# Newton's method stops at this share of the tolerance. Its own tolerance has a lower limit, below
-# which rounding errors would keep the residual.
+# Tolerance of Newton's method, as a share of the setting `tolerance`, and its lower limit: rounding
+# errors prevent a smaller residual.
 _NEWTON_SHARE, _LEAST_NEWTON_TOLERANCE = 0.1, 1e-12
 
 

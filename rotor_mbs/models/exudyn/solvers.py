@@ -32,8 +32,8 @@ MOST_COLUMNS = 7
 # Largest number of halvings of an interval: a part of it has at least 1/4096 of its length.
 _MOST_HALVINGS = 12
 
-# Smallest tolerance, rad. Error estimates do not get below some units in the last place of Euler
-# parameters.
+# Rounding error of an angle, rad: some units in the last place of Euler parameters. No smaller
+# tolerance is used, because error estimates do not get below it.
 _ROUNDING = 100.0 * float(np.finfo(float).eps)
 
 # A component of a state below this share of the largest component of its kind is a rounding error,
@@ -139,8 +139,8 @@ class ExtrapolatedSolver:
         parts = chain.parts(scene, self._loads)
         sensors = [part.name for part in parts if part.kind == "sensor"]
         self._of_rates = [name for name in sensors if name.endswith(("rotation", "spin"))]
-        # The engine evaluates sensors that store their readings after every step. Only the sensors
-        # that the work needs are such sensors.
+        # The engine evaluates after every step each sensor that stores its readings. Therefore only
+        # the sensors that the work needs store them.
         for number, part in enumerate(parts):
             if part.kind == "sensor":
                 stored = part.name in self._of_rates

@@ -42,7 +42,7 @@ from rotor_mbs.solution.trajectory import (
 _engine: Any = mujoco
 _engine.set_mju_user_warning(lambda _message: None)
 
-# The engine's warnings of positions, velocities and accelerations that are huge or not finite.
+# The engine's warnings about positions, velocities and accelerations that are huge or not finite.
 _BAD_STATE_WARNINGS = (
     _engine.mjtWarning.mjWARN_BADQPOS,
     _engine.mjtWarning.mjWARN_BADQVEL,

@@ -41,7 +41,7 @@ class PrintedSolver:
         Parameters
         ----------
         name : name of the method.
-        errata : errata of equations that are derived anew; None for the equations as printed.
+        errata : errata that are left in the derived equations; None for the equations as printed.
         scene : the run.
         settings : the tolerances.
 
@@ -123,7 +123,7 @@ def point_mass_rotor(name: str, errata: Errata | None, scene: Scene) -> PointMas
     Parameters
     ----------
     name : name of the method.
-    errata : errata of equations that are derived anew; None for the equations as printed.
+    errata : errata that are left in the derived equations; None for the equations as printed.
     scene : the rotor.
 
     Raises
@@ -167,7 +167,7 @@ def equations(rotor: PointMassRotor, errata: Errata | None) -> Accelerations:
     Parameters
     ----------
     rotor : values of the paper's symbols.
-    errata : errata of equations that are derived anew; None for the equations as printed.
+    errata : errata that are left in the derived equations; None for the equations as printed.
     """
     m, c, d, g = rotor.m, rotor.c, rotor.d, rotor.g
     if not rotor.pitches_move:
@@ -248,7 +248,7 @@ def _method(name: str, label: str, errata: Errata | None = None, erratum: str = 
     Parameters
     ----------
     name, label : name and label of the method.
-    errata : errata of equations that are derived anew; None for the equations as printed.
+    errata : errata that are left in the derived equations; None for the equations as printed.
     erratum : name of the only erratum, such as "E1"; "" for the equations as printed.
     """
     return Method(

@@ -1,8 +1,8 @@
 """Compute tip path, energies, work and loads of the printed model's motion.
 
-All follow from the paper's transformation matrix (3). Energies and loads are those of a real rotor
-with this motion, even if the motion follows from erroneous equations. They show how much energy
-such equations produce, and how large their fictitious moments are.
+All of them follow from the paper's transformation matrix (3). Energies and loads are those of a
+real rotor with this motion, even if the motion follows from erroneous equations. They show how much
+energy such equations produce, and how large their fictitious moments are.
 """
 
 from __future__ import annotations
