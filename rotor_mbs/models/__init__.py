@@ -1,6 +1,6 @@
-"""Provide what the models that are equations share: the items of a scene, the settings of ode45.
+"""Define what `printed` and `lagrange` share: settings of ode45, and a list of a scene's equations.
 
-Importing this does not load NumPy.
+Importing this module does not load NumPy.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Ode45Settings(Settings):
-    """MATLAB's ode45."""
+    """Settings of MATLAB's ode45."""
 
     relative_tolerance: float = number(1e-6, above=0.0, doc="relative tolerance of the local error")
     absolute_tolerance: float = number(
@@ -31,7 +31,8 @@ def equation_items(scene: Scene, sources: tuple[str, str] = ("", "")) -> list[Bu
     Parameters
     ----------
     scene : the rotor, its loads and outputs.
-    sources : where the rotor's equation, and where those of the pitches, come from; "" for none.
+    sources : source of the rotor's equation, and source of the pitches' equations, as texts that
+        are listed beside the equations; "" lists no source.
     """
     moving = scene.moving_coordinates
     of_rotor, of_pitch = sources

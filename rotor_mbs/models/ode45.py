@@ -1,7 +1,7 @@
-"""Solve differential equations as MATLAB's ode45 does, with that function's own step control.
+"""Solve differential equations as MATLAB's ode45 does, with the same step control.
 
-It is Dormand and Prince's pair. On a chaotic problem the step control decides the digits, so it is
-followed exactly.
+The method is the Runge-Kutta pair of orders 5 and 4 by Dormand and Prince. In a chaotic problem the
+digits of the result depend on the step sizes. Therefore the step control follows ode45 exactly.
 
 [DP]  J. R. Dormand, P. J. Prince: A family of embedded Runge-Kutta formulae. J. Comput. Appl. Math.
       6 (1980), 19-26.
@@ -25,7 +25,9 @@ from rotor_mbs.solution.trajectory import Array
 RightHandSide = Callable[[float, Sequence[float]], list[float]]
 
 F = Fraction
-# [DP] Table 2, RK5(4)7M. The last row of A is b: local extrapolation, first same as last.
+# [DP] Table 2, RK5(4)7M: nodes c, and rows 2 to 7 of the matrix A. The last row of A is also the
+# row of weights b of order 5, with which the step is made. So the last stage of a step is the first
+# stage of the next step.
 NODES = (F(0), F(1, 5), F(3, 10), F(4, 5), F(8, 9), F(1), F(1))
 STAGES = (
     (F(1, 5),),
@@ -35,7 +37,7 @@ STAGES = (
     (F(9017, 3168), F(-355, 33), F(46732, 5247), F(49, 176), F(-5103, 18656)),
     (F(35, 384), F(0), F(500, 1113), F(125, 192), F(-2187, 6784), F(11, 84)),
 )
-# Fifth-order weights less the fourth-order ones.
+# Weights of order 5 minus weights of order 4.
 ERROR = (F(71, 57600), F(0), F(-71, 16695), F(71, 1920), F(-17253, 339200), F(22, 525), F(-1, 40))
 # [JSS] Table 2: weight of stage i in y(t + s h) is h Σ_j INTERPOLANT[i][j] s^(j+1).
 INTERPOLANT = (
@@ -48,7 +50,7 @@ INTERPOLANT = (
     (F(0), F(3, 2), F(-4), F(5, 2)),
 )
 
-_POWER = 1.0 / 5.0  # one over the order of the formula that is carried on
+_POWER = 1.0 / 5.0  # one over the order of the formula that makes the step
 _C2, _C3, _C4, _C5 = (float(node) for node in NODES[1:5])
 (
     (_A21,),
@@ -64,15 +66,16 @@ _INTERPOLANT: Array = np.array([[float(weight) for weight in row] for row in INT
 
 @dataclass(frozen=True, slots=True)
 class Ode45Result:
-    """Hold every accepted step with its stages, so that the solution can be evaluated at any time.
+    """Hold the k accepted steps with their stages, from which `at` interpolates the solution.
 
     Attributes
     ----------
-    time : (k + 1,), of the start and of every step's end.
-    state : (k + 1, n).
-    stages : (k, 7, n), derivatives of every step.
-    success, message : whether the end was reached, and why not.
-    evaluations : of the right-hand side.
+    time : (k + 1,) times of the start and of the end of every step.
+    state : (k + 1, n) states at these times.
+    stages : (k, 7, n) the seven derivatives computed in every step.
+    success : whether the end time was reached.
+    message : why the end time was not reached; "" if it was.
+    evaluations : number of evaluations of the right-hand side.
     """
 
     time: Array
@@ -88,16 +91,16 @@ class Ode45Result:
         return len(self.time) - 1
 
     def at(self, times: Array) -> Array:
-        """Return the pair's quartic interpolant at some times, (len(times), n).
+        """Return the states at the given times by the pair's quartic interpolant, (m, n).
 
         Parameters
         ----------
-        times : (m,), in any order.
+        times : (m,) times in any order.
 
         Raises
         ------
         ValueError
-            If a time is outside of what was reached.
+            If a time is before the start or after the last time reached.
         """
         if np.any(times < self.time[0]) or np.any(times > self.time[-1]):
             raise ValueError(f"the solution covers [{self.time[0]:g}, {self.time[-1]:g}] only")
@@ -110,15 +113,20 @@ class Ode45Result:
         value: Array = self.state[step] + h[:, None] * np.einsum(
             "ts,tsn->tn", weights, self.stages[step]
         )
-        # the last step's end: the state itself, free of the interpolant's rounding
+        # At the end of the last step return the stored state. The interpolant would round it.
         at_end = s == 1.0
         value[at_end] = self.state[step[at_end] + 1]
         return value
 
     def refined(self) -> tuple[Array, Array]:
-        """Return (time, state) as ode45 does by default: at four times in each step.
+        """Return times and states as ode45 does by default: the start, then four times per step.
 
-        The last of the four is the step's end.
+        The four times are equally spaced, and the last of them is the end of the step.
+
+        Returns
+        -------
+        time : ndarray, shape (4 k + 1,)
+        state : ndarray, shape (4 k + 1, n)
         """
         fractions = np.arange(4) / 4
         inner = self.time[:-1, None] + np.diff(self.time)[:, None] * fractions
@@ -135,21 +143,21 @@ def ode45(
     rel_tol: float = 1e-3,
     abs_tol: float = 1e-6,
 ) -> Ode45Result:
-    """Solve y' = f(t, y) in plain floats.
+    """Solve y' = f(t, y) from t = 0 to `t_end`, in plain floats.
 
     Parameters
     ----------
-    f : (t, y) -> y', (n,); returns NaN where it is not defined.
-    t_end : above 0; the start is at 0.
-    initial_state : (n,).
-    rel_tol, abs_tol : of the local error; the error of a component is relative to the larger of its
-        magnitude and abs_tol / rel_tol.
+    f : function (t, y) -> y', (n,). It returns NaN if y' is not defined.
+    t_end : end time, above 0.
+    initial_state : (n,) state at t = 0.
+    rel_tol, abs_tol : tolerances of the local error. The error of a component is divided by the
+        magnitude of the component, or by abs_tol / rel_tol if that is larger.
 
     Returns
     -------
     Ode45Result
-        With success False, and what was reached, where a step would have to be shorter than 16
-        units in the last place of t.
+        The accepted steps. If a step would have to be shorter than 16 units in the last place of t,
+        the integration ends there, and `success` is False.
     """
     threshold = abs_tol / rel_tol
     t, y = 0.0, [float(value) for value in initial_state]
@@ -163,8 +171,8 @@ def ode45(
         h_min = smallest_step(t)
         h = min(h_max, max(h_min, h))
         if done := 1.1 * h >= t_end - t:
-            # The last step is stretched, or cut, to the end. The difference is exact, because t is
-            # past half of t_end.
+            # The last step is lengthened or shortened so that it ends at t_end. The subtraction has
+            # no rounding error, because t is larger than t_end / 2.
             h = t_end - t
         failed_here = False
         while True:
@@ -178,12 +186,12 @@ def ode45(
                     f"the step size below the smallest value allowed ({h_min:e}) at time t."
                 )
                 break
-            # A last step that fails becomes shorter, and no longer reaches the end.
+            # If the last step fails, it becomes shorter and no longer reaches t_end.
             h, done = max(h_min, after_failure(h, error, rel_tol, failed_here)), False
             failed_here = True
         if message:
             break
-        t, y, k1 = t + h, y_new, k[6]  # first same as last
+        t, y, k1 = t + h, y_new, k[6]  # the last stage is the first stage of the next step
         times.append(t)
         states.append(y)
         stages.append(k)
@@ -194,21 +202,21 @@ def ode45(
 
 
 def smallest_step(t: float) -> float:
-    """Return hmin of ode45 at time t: 16 units in the last place."""
+    """Return the smallest step that ode45 takes at time t: 16 units in the last place of t."""
     return 16.0 * math.ulp(t)
 
 
 def first_step(
     y: Sequence[float], k1: Sequence[float], h_max: float, rel_tol: float, threshold: float
 ) -> float:
-    """Return the first step that ode45 tries: h_max, or less for a steep slope at the start.
+    """Return the first step that ode45 tries: h_max, or less if the state changes fast there.
 
     Parameters
     ----------
     y, k1 : (n,) state and its derivative at the start.
-    h_max : the largest step.
-    rel_tol : of the local error.
-    threshold : below which a component's error is not relative to it.
+    h_max : largest step allowed.
+    rel_tol : relative tolerance of the local error.
+    threshold : smallest magnitude by which the error of a component is divided.
     """
     slope = max(abs(rate) / max(abs(value), threshold) for value, rate in zip(y, k1, strict=True))
     rate_of_change = 1.25 * slope / rel_tol**_POWER
@@ -216,29 +224,32 @@ def first_step(
 
 
 def _after_success(h: float, error: float, rel_tol: float) -> float:
-    """Return the step after one that met the tolerance: by its error, at most five times as long.
+    """Return the size of the step that follows an accepted step, from the error of that step.
+
+    It is at most five times the accepted step.
 
     Parameters
     ----------
-    h : the step that was taken.
-    error : of it, relative.
-    rel_tol : its tolerance.
+    h : size of the accepted step.
+    error : relative error of the accepted step.
+    rel_tol : relative tolerance of the local error.
     """
     shrink = 1.25 * (error / rel_tol) ** _POWER
     return h / shrink if shrink > 0.2 else 5.0 * h
 
 
 def after_failure(h: float, error: float, rel_tol: float, failed_before: bool) -> float:
-    """Return the step to be tried after one with too large an error, from the same time.
+    """Return the size of the step to try again from the same time, after a step failed.
 
-    At the first failure it follows from the error, at the next ones it is half as long.
+    A step fails if its error is above the tolerance. After the first failure at a time the new size
+    follows from the error. After every further failure at this time the size is halved.
 
     Parameters
     ----------
-    h : the step that failed.
-    error : of it, relative.
-    rel_tol : its tolerance.
-    failed_before : whether a step failed before at this time.
+    h : size of the step that failed.
+    error : relative error of the step that failed.
+    rel_tol : relative tolerance of the local error.
+    failed_before : whether a longer step from this time had failed before.
     """
     return 0.5 * h if failed_before else h * max(0.1, 0.8 * (rel_tol / error) ** _POWER)
 
@@ -246,26 +257,26 @@ def after_failure(h: float, error: float, rel_tol: float, failed_before: bool) -
 def _attempt(
     f: RightHandSide, t: float, y: list[float], k1: list[float], h: float, threshold: float
 ) -> tuple[list[float], tuple[list[float], ...], float]:
-    """Take one step of the pair.
+    """Compute one step of the pair, and its error.
 
     Lists of floats are twice as fast as NumPy arrays for the few equations of a rotor.
 
     Parameters
     ----------
-    f : the right-hand side.
-    t, y : time and state (n,) at the start.
-    k1 : (n,) the derivative there.
-    h : the step.
-    threshold : below which a component's error is not relative to it.
+    f : right-hand side.
+    t, y : time and state (n,) at the start of the step.
+    k1 : (n,) derivative at the start of the step.
+    h : size of the step.
+    threshold : smallest magnitude by which the error of a component is divided.
 
     Returns
     -------
     y_new : list of float
-        The state at the end.
+        State at the end of the step.
     stages : tuple of list of float
-        Seven derivatives.
+        The seven derivatives.
     error : float
-        Relative to the state; inf where it is not a number.
+        Largest relative error of a component; inf if an error is not finite.
     """
     k2 = f(t + _C2 * h, [a + h * (_A21 * p) for a, p in zip(y, k1, strict=True)])
     k3 = f(t + _C3 * h, [a + h * (_A31 * p + _A32 * q) for a, p, q in zip(y, k1, k2, strict=True)])
@@ -300,6 +311,6 @@ def _attempt(
         / max(abs(a), abs(b), threshold)
         for a, b, p, r, u, v, w, x in zip(y, y_new, k1, k3, k4, k5, k6, k7, strict=True)
     ]
-    # The sum is finite only if every ratio is; max alone can lose a NaN.
+    # The sum is finite only if every ratio is finite. `max` alone can overlook a NaN.
     error = h * max(ratios) if math.isfinite(sum(ratios)) else math.inf
     return y_new, (k1, k2, k3, k4, k5, k6, k7), error

@@ -1,1 +1,1 @@
-"""Evaluate the right closed form of the rotor's Euler-Lagrange equations, for any rigid blades."""
+"""Integrate and linearize the closed form of the rotor's Lagrange equations, for rigid blades."""

@@ -1,8 +1,8 @@
 """Evaluate the closed form: accelerations by an arrowhead solve, energies, and paths of points.
 
-NumPy, SciPy and heyoka use the same functions. Each takes numbers of any kind that knows + - * /
-(floats, arrays, quad precision, symbolic expressions) together with a sine and a cosine for that
-kind, and contains no branch on a value.
+The functions are used with NumPy, SciPy and heyoka. Each takes numbers of any kind that has + - * /
+(floats, arrays, quad precision, symbolic expressions), and a sine and a cosine for that kind. No
+function branches on the value of a number.
 
 Symbols: φ = q2 + 2π(i-1)/N azimuth of blade i, θ its pitch, Ω = q̇2, s = sin θ, c = cos θ; τ tilt,
 β cone. The blade's axes in the base frame are Rx(τ) Ry(φ) Rx(-β) Rz(θ), so that its angular
@@ -16,7 +16,9 @@ the kinetic energy T = ½ J_hub Ω² + ½ Σ ω·J ω is
     T = ½ (J_hub + Σ A) Ω² + Σ B Ω θ̇ + ½ Σ Jzz θ̇²,
     A = cos²β a + 2 sin β cos β b + sin²β Jzz,  B = cos β b + sin β Jzz.
 
-The potential energy is, r the rest angle of the spring, u = x c - y s and v = x s + y c,
+With (x, y, z) the centre of mass in the blade's frame, h its height above the apex, k and r the
+stiffness and the rest angle of the bearing spring, u = x c - y s and v = x s + y c, the potential
+energy is
 
     V = Σ m g h + ½ k (θ - r)²,
     h = sin τ (v cos β + z sin β) + cos τ (-u sin φ + (z cos β - v sin β) cos φ).
@@ -25,8 +27,8 @@ The mass matrix is an arrowhead; eliminating the pitches leaves the Schur comple
 
     S = J_hub + Σ (A - B²/Jzz) = J_hub + Σ cos²β (a - b²/Jzz).
 
-The terms that tilt or cone make linear in s and c are in `BladeForm.lean`, and cost an upright
-rotor nothing.
+`BladeForm.lean` has the coefficients of the terms that exist only with tilt or cone. A rotor
+without both skips these terms.
 """
 
 from __future__ import annotations
@@ -39,7 +41,8 @@ from rotor_mbs.models.lagrange.parameters import BladeForm, Lean, Number, RotorF
 from rotor_mbs.scenario.time_table import ROTOR_TORQUE, rest_place, torque_place
 
 Function = Callable[[Any], Any]
-Accelerations = Callable[..., list[Number]]  # `accelerations`, or other equations in their place
+# A function with the parameters and the result of `accelerations`, which replaces it.
+Accelerations = Callable[..., list[Number]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,16 +51,18 @@ class LoadValues:
 
     rotor: Number  # N m on the rotor
     pitches: Sequence[Number] = ()  # (form.blades,) N m between hub and blade; () for none
-    # (form.blades,) rad, at which the bearings' springs are unloaded; () for 0
+    # (form.blades,) rad, rest angles: pitch angles at which the bearings' springs are unloaded; ()
+    # for 0
     rests: Sequence[Number] = ()
 
 
 def load_values(values: Sequence[Any], pitches: Sequence[int]) -> LoadValues:
-    """Return the loads of the coordinates that move.
+    """Return the loads of the coordinates that move, from the values of all loads of a scene.
 
     Parameters
     ----------
-    values : one number, or array over time, for each of `Scene.load_tables`: N m and rad.
+    values : for each of `Scene.load_tables` a number, or an array over time: torques in N m, rest
+        angles in rad.
     pitches : the coordinates of the pitches that move, `Scene.moving_coordinates[1:]`.
     """
     return LoadValues(
@@ -75,22 +80,23 @@ def accelerations(
     sin: Function,
     cos: Function,
 ) -> list[Number]:
-    """Compute the accelerations by Lagrange's equations of T - V above.
+    """Compute the accelerations by Lagrange's equations for T - V of the module docstring.
 
-    Singular where S = 0: point-mass blades all at ±π/2 on a massless hub.
+    The equations are singular where S = 0. An example is a massless hub with blades that are point
+    masses in the plane y = 0 of their frames, all at pitch angles of ±π/2.
 
     Parameters
     ----------
-    angles, rates : of the rotor, then of the pitches that move: 1 + len(form.blades) in rad and
-        rad/s.
+    angles, rates : (1 + len(form.blades),) rad and rad/s, of the rotor, then of the pitches that
+        move.
     form : the coefficients.
     loads : the loads of the coordinates that move.
-    sin, cos : for the kind of number.
+    sin, cos : sine and cosine for the kind of number.
 
     Returns
     -------
     list
-        rad/s², rotor, then pitches.
+        (1 + len(form.blades),) rad/s², of the rotor, then of the pitches that move.
     """
     sin_q, cos_q = sin(angles[0]), cos(angles[0])
     spin = rates[0]
@@ -98,8 +104,8 @@ def accelerations(
     moment = loads.rotor - form.shaft_damping * spin
     for weight, cos_phase, sin_phase in form.fixed:
         moment = moment + weight * (sin_q * cos_phase + cos_q * sin_phase)
-    # s and c are factored out: an integrator that works with series pays for every product of two
-    # of them.
+    # s and c are factored out, because products of two functions of time are expensive for an
+    # integrator that works with Taylor series.
     pitched = []
     for blade, theta, rate, torque, rest in pitches(form, angles, rates, loads):
         s, c = sin(theta), cos(theta)
@@ -108,13 +114,14 @@ def accelerations(
         s_turn, c_turn = s * (spin * spin), c * (spin * spin)
         ratio = blade.ratio_s * s + blade.ratio_c * c  # B / Jzz, without tilt and cone
         resistance = blade.stiffness * (theta - rest) + blade.damping * rate - torque
-        # ½ ∂A/∂θ Ω² and gravity, both on the pitch: s·on_s + c·on_c
+        # The moment of ½ ∂A/∂θ Ω² and gravity on the pitch is s·on_s + c·on_c.
         on_s = (
             blade.half_slope_sc * c_turn - blade.half_slope_cs * s_turn - blade.weight_x * sin_phi
         )
         on_c = blade.half_slope_cs * c_turn - blade.weight_y * sin_phi
-        # In the rotor's moment, pitch eliminated, ½ ∂A/∂θ times drag: Coriolis, and B / Jzz times
-        # what turns the pitch.
+        # The rotor's moment, after the pitch is eliminated, contains -½ ∂A/∂θ times `drag`. `drag`
+        # is the sum of a Coriolis term and of B / Jzz Ω², by which the moment ½ ∂A/∂θ Ω² on the
+        # pitch acts on the rotor.
         drag = 2.0 * (spin * rate) + (blade.ratio_s * s_turn + blade.ratio_c * c_turn)
         lean = blade.lean
         if lean:
@@ -156,8 +163,8 @@ def pitches(
 
     Parameters
     ----------
-    form, angles, rates, loads : as of `accelerations`; torques and rest angles that are left out of
-        the loads are zero.
+    form, angles, rates, loads : see `accelerations`. Pitch torques or rest angles that are () count
+        as zero.
     """
     nothing = (0.0,) * len(form.blades)
     return zip(
@@ -171,10 +178,10 @@ def pitches(
 
 
 def power(rates: Sequence[Number], form: RotorForm, loads: LoadValues) -> Number:
-    """Return the power (W) of torques and rest angles, less what the dampers take.
+    """Return the power (W) of torques and rest angles, minus the power that the dampers dissipate.
 
-    A spring with rest angle r acts with the moment k r here. The work of a spring whose rest angle
-    moves, -∫ k (θ - r) dr, is that of k r on the pitch and the change of `rest_energy`.
+    A rest angle r counts here as the moment k r on the pitch. The work that is done by moving the
+    rest angle, -∫ k (θ - r) dr, is the work of this moment plus the change of `rest_energy`.
 
     Parameters
     ----------
@@ -190,7 +197,9 @@ def power(rates: Sequence[Number], form: RotorForm, loads: LoadValues) -> Number
 
 
 def rest_energy(angles: Sequence[Number], form: RotorForm, rests: Sequence[Number]) -> Number:
-    """Return the energy ½ k r (r - 2θ) (J) that rest angles r add to springs unloaded at zero.
+    """Return the energy Σ ½ k r (r - 2θ) (J) that rest angles r add to that of the springs.
+
+    The springs' energy without rest angles is Σ ½ k θ².
 
     Parameters
     ----------
@@ -214,11 +223,12 @@ def energies(
 ) -> tuple[Number, Number]:
     """Return kinetic and potential energy (J).
 
-    The potential energy is gravity's, zero at the height of the apex, and that of bearing springs.
+    The potential energy is that of gravity, zero at the height of the apex, plus that of the
+    bearing springs.
 
     Parameters
     ----------
-    angles, rates, form, loads, sin, cos : as of `accelerations`.
+    angles, rates, form, loads, sin, cos : see `accelerations`.
     """
     sin_q, cos_q = sin(angles[0]), cos(angles[0])
     spin = rates[0]
@@ -264,16 +274,16 @@ def point_path(
     cos: Function,
     lean: Lean | None = None,
 ) -> tuple[Number, Number, Number]:
-    """Return the place of a point of a blade in the base frame, (x, y, z) in m.
+    """Return the position of a blade's point in the base frame, (x, y, z) in m.
 
-    It is Rx(tilt)·Ry(azimuth)·Rx(-cone)·Rz(pitch)·point.
+    The position is Rx(tilt)·Ry(azimuth)·Rx(-cone)·Rz(pitch)·point.
 
     Parameters
     ----------
     azimuth, pitch : rad.
     point : (3,) m in the blade's frame.
-    sin, cos : for the kind of number.
-    lean : cosines and sines of cone and tilt; None where both are 0.
+    sin, cos : sine and cosine for the kind of number.
+    lean : cosines and sines of cone and tilt; None if both are 0.
     """
     x, y, z = point
     s, c = sin(pitch), cos(pitch)

@@ -1,6 +1,6 @@
-"""Compute interval defects by the closed form, from each sample of a run to the next one.
+"""Compute the interval defects of a run by integrating the closed form from sample to sample.
 
-They are exact at jumps of the loads.
+The integration stops at kinks and jumps of the loads, so that these cause no error.
 """
 
 from __future__ import annotations
@@ -30,46 +30,55 @@ from rotor_mbs.solution.defects import BLOCK_ROWS, Defects, row_blocks
 from rotor_mbs.solution.metrics import ANGLE_LIMIT
 from rotor_mbs.solution.trajectory import Array, Trajectory
 
-# Of one interval, by heyoka and by DOP853. A stiff bearing of 1e12 N m/rad takes some 600 and 900,
-# a minute of chaos 2,900 and 8,400; samples far from any motion would need an unlimited number. An
-# interval that needs more is taken for no motion of this rotor.
+# Largest number of steps in one interval, by heyoka and by DOP853. A stiff bearing of 1e12 N m/rad
+# takes some 600 and 900 steps, a minute of chaotic motion 2,900 and 8,400. Samples far from any
+# motion would need an unlimited number. If an interval needs more steps, its samples count as no
+# motion of this rotor.
 _MAX_STEPS_TAYLOR = 5_000
 _MAX_STEPS_DOP853 = 10_000
-# One such interval decides the status, and more of them do not change it. So each halves the number
-# of steps that the next may take, down to this one: samples that are all far from a motion take
-# little more than one interval's steps.
+# One interval that needs too many steps decides the status, and more such intervals do not change
+# it. Therefore each of them halves the number of steps that the next intervals may take, but not
+# below this number. If all samples are far from a motion, the total number of steps is then little
+# more than that of one interval.
 _FEWEST_STEPS = 50
-_TAYLOR = 2.0**-52  # tolerance
-_DOP853 = (2.3e-14, 1e-16)  # tolerances, the tightest that SciPy takes
-_EVALUATIONS_PER_STEP = 12  # of DOP853, whether a step is kept or tried again
-# Runge-Kutta steps of order 4 over a quarter of a radian leave a share of about 1e-5 of the
-# transition matrices.
+_TAYLOR = 2.0**-52  # tolerance of heyoka
+# Relative and absolute tolerance of DOP853. SciPy allows hardly a smaller relative one.
+_DOP853 = (2.3e-14, 1e-16)
+_EVALUATIONS_PER_STEP = 12  # evaluations of each step that DOP853 tries, accepted or not
+# Angle (rad) by which the fastest coordinate may advance in one Runge-Kutta step of order 4. The
+# relative error of the transition matrices is then about 1e-5.
 _RADIANS_PER_STEP = 0.25
-# Where rates change within an interval, they leave more. This shows in their state at the end,
-# compared with the more accurate one of `interval_ends`: in the paper's motions, up to this
-# distance (rad and rate units) the matrices are right to a share of 4e-4.
+# The relative error is larger if rates change within an interval. The state that the Runge-Kutta
+# steps reach then differs from the more accurate one of `interval_ends`. If the difference is at
+# most this (rad and rate units), the relative error of the matrices is at most 4e-4 in the paper's
+# motions.
 _ROUGH_END = 3e-5
-# Of an interval. Beyond some 75 steps the integration of every interval by itself is faster, and
-# always more accurate.
+# Largest number of Runge-Kutta steps in an interval. Integrating every interval by itself is always
+# more accurate, and is faster if an interval needs more than about 75 Runge-Kutta steps.
 _MAX_RUNGE_KUTTA_STEPS = 32
-# Rows of a window in which rates are found from angles: two would leave no residual, and would not
-# reduce noise.
+# Number of rows in the window from whose angles the rates of a row are computed. A window of two
+# rows would have no residual and would not reduce noise.
 FIT_ROWS = 5
-_FIT_ROUNDS = 12
-_STANDS_STILL = 1e-9  # rad in an interval: the remaining error is the square of it
-# rad in an interval, median of the rows: where the first correction of the finite differences is at
-# most this, right data of the paper's motions always converged; from 0.8 on some did not.
+_FIT_ROUNDS = 12  # largest number of Gauss-Newton corrections
+# A correction of the rates times the sample interval (rad) at which they have converged: the error
+# that remains is of the order of its square.
+_STANDS_STILL = 1e-9
+# The rows are near enough if the first correction of the finite differences, times the sample
+# interval, has at most this median (rad) over the rows. Up to this value correct data of the
+# paper's motions always converged; from 0.8 on some did not.
 _NEAR = 0.5
-_SIDE = 1e-9  # of a step
+_SIDE = 1e-9  # distance from the ends of an interval at which loads are evaluated, in steps
 _UNIT_ROUNDOFF = 2.0**-53
-# Below this share of its inertia a rotor is singular, and nothing is known of the interval.
+# Smallest share of its inertia with which a rotor is not singular. The error of an interval with a
+# singular rotor is unknown.
 _SMALLEST_SHARE = 1e-30
-# rad and rate units: rounding and curvature are a share of 1e-8 or so of a matrix's entries
+# Difference (rad and rate units) of the difference quotients. Rounding and curvature then change
+# the entries of a matrix by a share of about 1e-8.
 _DIFFERENCE = 1e-7
-# Where errors grow so much that such a difference is not small any more at the end of the interval,
-# this smaller one is tried.
+# Difference that is tried next, if errors grow so much that the first one is larger than
+# _SMALL_AT_END (rad and rate units) at the end of the interval.
 _SMALL_DIFFERENCE = 1e-11
-_SMALL_AT_END = 0.1  # rad and rate units
+_SMALL_AT_END = 0.1
 
 
 def interval_defects(
@@ -80,28 +89,30 @@ def interval_defects(
     rounding: Array | None = None,
     time_rounding: Array | None = None,
 ) -> Defects:
-    """Compute the defects of samples, of a run or of other data, against the closed form.
+    """Compute the interval defects of samples, which may be those of a run or other data.
+
+    The closed form is integrated by heyoka at its tightest tolerance, or by SciPy's DOP853 if
+    heyoka is not installed.
 
     Parameters
     ----------
     scene : the rotor and its loads.
     time : (n,) s, increasing, within the scene's duration.
     angles, rates : (n, 1 + blades) rad and rad/s.
-    rounding : (2 + 2 blades,), or for each row: half a unit in the last digit of angles, then
-        rates; that of doubles where left out.
-    time_rounding : (n,) s, likewise.
+    rounding : (2 + 2 blades,) or (n, 2 + 2 blades) rad, then rad/s, half a unit in the last digit
+        of angles, then rates; by default that of doubles.
+    time_rounding : (n,) s, half a unit in the last digit of the times; by default that of doubles.
 
     Returns
     -------
     Defects
-        Of n - 1 intervals. By heyoka at its tightest, or by SciPy's DOP853 where that is not
-        installed.
+        The defects of the n - 1 intervals.
     """
     moving = scene.moving_coordinates
     states = np.hstack([angles[:, moving], rates[:, moving]])
     half = len(moving)
     ends = interval_ends(scene, time[:-1], time[1:], states[:-1])
-    # Pitches that are fixed keep their angles and rates.
+    # In the closed form a fixed pitch keeps its angle and rate.
     angle_defects, rate_defects = angles[:-1] - angles[1:], rates[:-1] - rates[1:]
     angle_defects[:, moving] = ends[:, :half] - states[1:, :half]
     rate_defects[:, moving] = ends[:, half:] - states[1:, half:]
@@ -118,7 +129,8 @@ def interval_defects(
         )
     if time_rounding is None:
         time_rounding = _UNIT_ROUNDOFF * np.abs(time)
-    # The time of a row is rounded, too: times the rate of change that is an error of the state.
+    # The time of a row is rounded, too. Its rounding, times the rate of change of a variable, is an
+    # error of this variable.
     last_digits = last_digits + time_rounding[:, None] * rates_of_change(scene, time, states)
     shares = least_inertia_shares(scene, angles)
     start = np.concatenate(
@@ -144,7 +156,9 @@ def interval_defects(
 
 
 def rates_of_change(scene: Scene, time: Array, states: Array) -> Array:
-    """Return |dy/dt| of each variable at states; at a jump of a load, the larger of both sides.
+    """Return the magnitude of the time derivative of each variable at the given states.
+
+    At a jump of a load it is the larger of the values before and after the jump.
 
     Parameters
     ----------
@@ -178,13 +192,13 @@ def rates_of_change(scene: Scene, time: Array, states: Array) -> Array:
 
 @dataclass(frozen=True)
 class FittedRates:
-    """Hold rates that were computed from angles, and their sensitivity to these.
+    """Hold rates that were computed from angles, and the derivatives of the rates by the angles.
 
     Attributes
     ----------
     rates : (n, 1 + blades) rad/s.
-    sensitivity : (n, half, FIT_ROWS half) 1/s, of the rate of each of the `half` coordinates that
-        move, by each angle of its window.
+    sensitivity : (n, half, FIT_ROWS half) 1/s, derivatives of the rates by the angles in the window
+        of their row; `half` is the number of coordinates that move.
     windows : (n,) first row of the window of each row.
     """
 
@@ -193,22 +207,24 @@ class FittedRates:
     windows: NDArray[np.int64]
 
     def rounding(self, rounding: Array) -> Array:
-        """Return the rounding of the rates, (n, half) rad/s, that follows from that of the angles.
+        """Return the errors of the rates, (n, half) rad/s, that rounded angles cause.
 
         Parameters
         ----------
-        rounding : (n, half) rad, of the angles of the coordinates that move.
+        rounding : (n, half) rad, largest rounding errors of the angles of the coordinates that
+            move.
         """
         of_window = np.hstack([rounding[self.windows + row] for row in range(FIT_ROWS)])
         return np.asarray(np.einsum("kij,kj->ki", np.abs(self.sensitivity), of_window))
 
 
 def fitted_rates(scene: Scene, time: Array, angles: Array) -> FittedRates:
-    """Compute the rates of data that have angles only, by a fit of the closed form to five rows.
+    """Compute the rates of data that have angles only, by fits of the closed form to five rows.
 
-    Gauss-Newton least squares over the state at the first row of every window, which the transition
-    matrices carry through the window. It begins with finite differences of the angles, and ends
-    when the rates no longer change.
+    The rates of a row follow from the angles in a window of five rows. The unknowns of a fit are
+    the state at the first row of its window, from which transition matrices give the states at the
+    other rows. The fits are solved by Gauss-Newton corrections, which begin with finite differences
+    of the angles, and end when the rates no longer change.
 
     Parameters
     ----------
@@ -219,11 +235,11 @@ def fitted_rates(scene: Scene, time: Array, angles: Array) -> FittedRates:
     Raises
     ------
     InputError
-        If there are fewer rows than a window has, an angle is over `ANGLE_LIMIT`, the motion is too
-        stiff to carry a state from row to row, or the rows are so far apart that the rates do not
-        converge from finite differences. If the rates do not converge although the rows are near,
-        no motion passes through some of them: then nothing is raised, and the rates of the others
-        are found.
+        If there are fewer rows than a window has, an angle is over `ANGLE_LIMIT`, errors grow
+        without bound from one row to the next, or the rows are so far apart that the rates do not
+        converge from finite differences. No error is raised if the rows are near enough, but no
+        motion passes through some of them. The rates of these rows do not converge, those of the
+        other rows do.
     """
     count = len(time)
     if count < FIT_ROWS:
@@ -238,7 +254,8 @@ def fitted_rates(scene: Scene, time: Array, angles: Array) -> FittedRates:
     rates[:, moving] = np.gradient(angles[:, moving], time, axis=0, edge_order=2)
     firsts = np.arange(count - FIT_ROWS + 1)
     middle = FIT_ROWS // 2
-    # The window of a row is the one in whose middle it is, or near an end the first or last one.
+    # A row is in the middle of its window. Rows near the start or the end have the first or the
+    # last window.
     windows = np.clip(np.arange(count) - middle, 0, len(firsts) - 1)
     places = np.arange(count) - windows
     step = float(np.median(np.diff(time)))
@@ -249,8 +266,9 @@ def fitted_rates(scene: Scene, time: Array, angles: Array) -> FittedRates:
         ends = interval_ends(scene, time[:-1], time[1:], states[:-1])
         transitions = _transitions(scene, time, states, ends)
         jumps = ends - states[1:]
-        # Deviations from the data's own states: in each row of a window, matrix @ (deviation at the
-        # first row) + offset. The least squares make those of the angles small.
+        # In each row of a window the motion deviates from the state of the data by
+        # matrix @ (deviation at the first row) + offset. The least squares minimize the deviations
+        # of the angles.
         matrices = [np.broadcast_to(np.eye(2 * half), (len(firsts), 2 * half, 2 * half))]
         offsets = [np.zeros((len(firsts), 2 * half))]
         for row in range(FIT_ROWS - 1):
@@ -280,8 +298,8 @@ def fitted_rates(scene: Scene, time: Array, angles: Array) -> FittedRates:
             is_near = usual <= _NEAR
         if change <= _STANDS_STILL:
             break
-        # Without progress, end where most rows have converged and the others fit no motion, or
-        # where the finite differences were too far away.
+        # If the largest correction does not decrease, stop in two cases. Either most rows have
+        # converged, and the other rows fit no motion. Or the finite differences were too far away.
         if not change < before and (usual <= _STANDS_STILL or not is_near):
             break
         before = change
@@ -302,19 +320,19 @@ def interval_ends(
     ----------
     scene : the rotor and its loads.
     begins, ends : (n,) s, start and end of the interval of each row, increasing.
-    states : (n, m) angles, then rates, of the coordinates that move.
-    integration : of this scene, to be used in several calls; built here where left out.
+    states : (n, m) rad, then rad/s, angles, then rates, of the coordinates that move, at `begins`.
+    integration : result of `_integration_of` for this scene, if several calls share it; by default
+        it is built here.
 
     Returns
     -------
     ndarray, shape (n, m)
-        States at `ends`; NaN where the end is not reached, or would take more steps than any motion
-        of the rotor.
+        States at `ends`. A row is NaN if its end is not reached within the allowed number of steps.
     """
     segments = scene.load_segments
     advance, max_steps = integration or _integration_of(scene, states.shape[1])
     reached_states = states.astype(float)
-    # Not asked of each state in the loop, where it would take as long as a step.
+    # All states are checked here at once. In the loop the check would take as long as a step.
     is_finite = np.asarray(np.isfinite(states).all(axis=1))
     place = 0
     for k, (state, begin, end) in enumerate(
@@ -326,28 +344,31 @@ def interval_ends(
             place += 1
         part, steps, is_there = place, 0, bool(is_finite[k])
         while reached < end and is_there:
-            # Data may go on after the scene's end, with the last loads.
+            # Data may extend beyond the scene's end. The last segment's loads apply there.
             until = min(segments[part].end, end) if part + 1 < len(segments) else end
             state, taken = advance(segments[part], reached, until, state, max_steps)
             reached, part, steps = until, part + 1, steps + taken
             if reached < end:
                 is_there = bool(np.isfinite(state).all())
         reached_states[k] = state
-        # See _FEWEST_STEPS.
+        # The reason is at _FEWEST_STEPS.
         if steps >= _FEWEST_STEPS and not np.isfinite(state).all():
             max_steps = max(max_steps // 2, _FEWEST_STEPS)
     reached_states[~np.isfinite(reached_states).all(axis=1)] = np.nan
     return reached_states
 
 
-# (segment, start, end, state at the start, most steps) -> state at the end, NaN where it is not
-# reached; steps taken
+# A function (segment, start, end, state at the start, largest number of steps) that returns the
+# state at the end, NaN if the end is not reached, and the number of steps.
 _Advance = Callable[[Segment, float, float, Array, int], tuple[Array, int]]
-_Integration = tuple[_Advance, int]  # and the most steps that it may take in an interval
+# An integration, and the largest number of steps that it may take in an interval.
+_Integration = tuple[_Advance, int]
 
 
 def _integration_of(scene: Scene, count: int) -> _Integration:
-    """Return the integration from sample to sample: by heyoka, or by DOP853 without it.
+    """Return the function that integrates over an interval, and its largest number of steps.
+
+    The function integrates by heyoka, or by DOP853 if heyoka is not installed.
 
     Parameters
     ----------
@@ -360,7 +381,7 @@ def _integration_of(scene: Scene, count: int) -> _Integration:
 
 
 def _advance_by_taylor(scene: Scene, count: int) -> _Advance:
-    """Return an integration over parts of segments by the compiled code of lagrange/taylor.
+    """Return a function that integrates over a part of a segment by heyoka's Taylor method.
 
     Parameters
     ----------
@@ -386,7 +407,9 @@ def _advance_by_taylor(scene: Scene, count: int) -> _Advance:
         if has_work:
             state[count:] = 0.0
         _, _, _, steps, *_ = integrator.propagate_until(end, max_steps=max_steps)
-        if integrator.time != end:  # too many steps, or not finite: what comes after it is neither
+        # The end is not reached after too many steps, or after a state that is not finite. Both are
+        # returned as NaN.
+        if integrator.time != end:
             state[:count] = np.nan
         return state[:count].copy(), steps
 
@@ -394,11 +417,11 @@ def _advance_by_taylor(scene: Scene, count: int) -> _Advance:
 
 
 def _advance_by_dop853(scene: Scene) -> _Advance:
-    """Return an integration over parts of segments by SciPy's DOP853.
+    """Return a function that integrates over a part of a segment by SciPy's DOP853.
 
     Parameters
     ----------
-    scene : the rotor and its loads; its outputs are reduced to angles and rates.
+    scene : the rotor and its loads. The work is not integrated, whatever its outputs are.
     """
     solver = OdeSolver(
         replace(scene, outputs=("angles", "rates")), scipy_integrator("DOP853", *_DOP853)
@@ -410,7 +433,7 @@ def _advance_by_dop853(scene: Scene) -> _Advance:
         integrator = scipy_integrator("DOP853", *_DOP853, max_steps)
         function = solver.right_hand_side(Segment(start, end, segment.linear_loads))
         part = integrator(function, start, end, values, np.empty(0))
-        raise_if_over()  # else the interval would count as one of no motion
+        raise_if_over()  # otherwise an interval cut by the time limit would count as no motion
         end_state = np.full(len(values), np.nan) if part.message else part.end
         return end_state, (part.evaluations or 0) // _EVALUATIONS_PER_STEP
 
@@ -422,8 +445,8 @@ def _transitions_in(scene: Scene, time: Array, states: Array, ends: Array, rows:
 
     Parameters
     ----------
-    scene, time, states, ends : as of `_transitions`.
-    rows : of the intervals; it begins and ends at whole numbers.
+    scene, time, states, ends : see `_transitions`.
+    rows : slice of the intervals; neither its start nor its end is None or negative.
     """
     samples = slice(rows.start, rows.stop + 1)
     return _transitions(scene, time[samples], states[samples], ends[rows])
@@ -435,14 +458,15 @@ def _transitions(scene: Scene, time: Array, states: Array, ends: Array) -> Array
     Parameters
     ----------
     scene : the rotor and its loads.
-    time : (n,) s, of the samples.
-    states : (n, m) at the samples, angles, then rates, of the coordinates that move.
-    ends : (n - 1, m) where `interval_ends` gets from them.
+    time : (n,) s, sample times.
+    states : (n, m) angles, then rates, of the coordinates that move, at the samples.
+    ends : (n - 1, m) states that `interval_ends` computes from them.
 
     Returns
     -------
     ndarray, shape (n - 1, m, m)
-        Right to a share of 5e-4, mostly of 1e-5; infinite where an end is not finite.
+        Matrices with a relative error of mostly 1e-5, and at most 5e-4. A matrix is infinite if the
+        end of its interval is not finite, or if errors grow too much for difference quotients.
     """
     count = states.shape[1]
     units = np.concatenate([np.ones(count // 2), rate_units(scene)])
@@ -463,8 +487,8 @@ def _transitions(scene: Scene, time: Array, states: Array, ends: Array) -> Array
             is_near &= np.isfinite(matrices).all(axis=(1, 2))
             transitions[rows[is_near]] = matrices[is_near]
             is_rough[rows[is_near]] = False
-    # Where explicit steps are too long or too rough: differences of ends that the integrator of the
-    # defects computes.
+    # For intervals in which Runge-Kutta steps would be too many or too inaccurate, take difference
+    # quotients of the more accurate `interval_ends`.
     rows = np.flatnonzero(is_rough)
     for difference in (_DIFFERENCE, _SMALL_DIFFERENCE):
         if len(rows):
@@ -490,16 +514,17 @@ def _difference_transitions(
     Parameters
     ----------
     scene : the rotor and its loads.
-    time, states, ends : as of `_transitions`.
-    rows : (k,) the samples at which the intervals begin.
-    differences : (m,) by how much each variable is moved.
+    time, states, ends : see `_transitions`.
+    rows : (k,) numbers of the samples at which the intervals begin.
+    differences : (m,) rad, then rad/s, changes of the variables at the start of an interval.
 
     Returns
     -------
-    matrices : ndarray, shape (k, m, m) Where errors have grown to the size of the motion, a matrix
-        says only that they grow no more.
+    matrices : ndarray, shape (k, m, m)
+        The difference quotients. They are valid only if `is_linear` is True.
     is_linear : ndarray of bool, shape (k,)
-        Whether every moved end is next to the interval's own.
+        Whether no difference has grown above `_SMALL_AT_END` at the end of the interval. Larger
+        differences do not grow linearly.
     """
     count = states.shape[1]
     units = differences / differences[0]
@@ -510,7 +535,7 @@ def _difference_transitions(
         for i in range(count):
             moved = states[rows]
             moved[:, i] += differences[i]
-            change = moved[:, i] - states[rows, i]  # as it is rounded
+            change = moved[:, i] - states[rows, i]  # the difference after rounding
             moved_ends = interval_ends(scene, time[rows], time[rows + 1], moved, integration)
             away = moved_ends - ends[rows]
             matrices[:, :, i] = away / change[:, None]
@@ -526,20 +551,20 @@ def _quick_transitions(
     Parameters
     ----------
     scene : the rotor and its loads.
-    time, states : as of `_transitions`.
-    rows : (k,) the samples at which the intervals begin.
-    units : (m,) what counts as 1 in each variable.
+    time, states : see `_transitions`.
+    rows : (k,) numbers of the samples at which the intervals begin.
+    units : (m,) rad, then rad/s, units of the variables.
     steps : number of steps in each interval.
 
     Returns
     -------
     matrices : ndarray, shape (k, m, m)
     ends : ndarray, shape (k, m)
-        The states that the same steps reach.
+        The states that the Runge-Kutta steps reach at the ends of the intervals.
     """
     count = states.shape[1]
-    # (m, 1 + directions, k): the state of every interval, as it is and moved by a difference in
-    # every direction.
+    # The array has the shape (m, 1 + m, k). For every interval it holds the state at the start, and
+    # m states of which each differs in one variable.
     moved = np.repeat(states[rows].T[:, None, :], 1 + count, axis=1)
     for i in range(count):
         moved[i, 1 + i] += _DIFFERENCE * units[i]
@@ -550,17 +575,18 @@ def _quick_transitions(
 
 
 def explicit_steps(scene: Scene, intervals: Array, states: Array, most: int) -> int | None:
-    """Return how many Runge-Kutta steps an interval needs, or None if more than `most`.
+    """Return the number of Runge-Kutta steps that each interval needs, or None if above `most`.
 
-    The fastest rate or pitch frequency advances by at most 0.25 rad in a step of the longest
-    interval.
+    In one step of the longest interval, the largest rate or pitch frequency may advance by at most
+    0.25 rad.
 
     Parameters
     ----------
     scene : the rotor.
-    intervals : (n,) s, their lengths.
-    states : (n, m) at their starts, angles, then rates, of the coordinates that move.
-    most : the largest number of steps that is allowed.
+    intervals : (n,) s, lengths of the intervals.
+    states : (n, m) angles, then rates, of the coordinates that move, at the starts of the
+        intervals.
+    most : largest number of steps allowed.
     """
     half = states.shape[1] // 2
     fastest = float(np.max(np.where(np.isfinite(states[:, half:]), np.abs(states[:, half:]), 0.0)))
@@ -595,28 +621,29 @@ def quick_ends(
 ) -> Array:
     """Compute the states at the ends of all intervals at once, by Runge-Kutta steps of order 4.
 
-    Differences of two calls are right to a share of some 1e-5, except where rates change within an
-    interval.
+    The difference of the results of two calls has a relative error of about 1e-5. The error is
+    larger if rates change within an interval.
 
     Parameters
     ----------
     scene : the rotor and its loads.
-    begins, ends : (n,) s.
-    states : (m, ..., n) at `begins`, angles, then rates, of the coordinates that move.
+    begins, ends : (n,) s, start and end of each interval.
+    states : (m, ..., n) angles, then rates, of the coordinates that move, at `begins`.
     steps : number of steps in each interval.
-    equations : the accelerations to integrate; the closed form's where left out.
-    step : another method, called as step(derivative, t, state, h).
+    equations : function that computes the accelerations; by default the closed form's.
+    step : function step(derivative, t, state, h) of another method; by default `runge_kutta_step`.
 
     Returns
     -------
     ndarray, shape (m, ..., n)
+        States at `ends`.
     """
     step = step or runge_kutta_step
     form, half = rotor_form(scene), len(states) // 2
     equations = equations or closed_form.accelerations
     h = (ends - begins) / steps
 
-    # At a jump of a load at the end of an interval, take the value inside the interval.
+    # If a load jumps at the start or end of an interval, take its value inside the interval.
     earliest, latest = begins + _SIDE * h, ends - _SIDE * h
     loads_inside = loads_over_time(scene)
 

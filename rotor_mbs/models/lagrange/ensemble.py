@@ -1,8 +1,9 @@
 """Run many scenes of lagrange/taylor at once, by heyoka's batch integrator in Hamilton's variables.
 
-One run per SIMD lane, one compile per structure. A run's numbers do not depend on its neighbours in
-the other lanes, so that any partition of a sweep gives the same bits. All is done in one thread:
-several processes run in parallel instead.
+Each SIMD lane of the processor integrates one run. Scenes whose equations have the same structure
+share compiled code. The numbers of a run do not depend on the runs in the other lanes. Therefore
+any partition of a sweep gives the same bits. The module uses one thread; a sweep runs several
+processes in parallel.
 """
 
 from __future__ import annotations
@@ -22,22 +23,24 @@ from rotor_mbs.models.lagrange.samples import constant_work
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.trajectory import Array, Integration, RunBlock
 
-# rad. From 1e14 on the sines of all lanes are computed in another way, with another rounding in the
-# lanes of smaller angles, too.
+# Largest angle (rad) in a lane that has no effect on other lanes. If one lane has an angle of 1e14
+# rad or more, the sines of all lanes are computed in another way, and are rounded differently.
 _HUGE = 1e13
 
 _ENERGIES = ("kinetic_energy", "potential_energy", "work")
 
-# Samples of all runs that are worked on at once, so that they stay in the processor's cache.
+# Number of samples, over all runs of a chunk, that are computed before they are written to the
+# block. So many stay in the processor's cache.
 _SAMPLES_PER_CHUNK = 4096
-# Samples of a run whose tips and energies are evaluated at once; the rotor's numbers are repeated
-# for each of them.
+# Number of samples of a run whose tips and energies are evaluated in one call. It is limited
+# because the rotor's parameters are repeated for each sample.
 _OBSERVED_PER_CALL = 1024
 
 
 def lanes() -> int:
-    """Return the number of runs side by side: as many as one vector register holds."""
-    # Two registers are a fifth slower, and take three times as long to compile.
+    """Return the number of lanes: runs that are integrated side by side in one vector register."""
+    # With the lanes of two registers, runs are a fifth slower and compiling takes three times as
+    # long.
     return int(heyoka().recommended_simd_size())
 
 
@@ -46,13 +49,14 @@ def solve_many(scenes: Sequence[Scene], tolerance: float) -> RunBlock:
 
     Parameters
     ----------
-    scenes : with the same number of blades and samples and the same outputs, loads not among them.
-    tolerance : of the local error.
+    scenes : scenes with the same number of blades and samples, and the same outputs, which must not
+        include loads.
+    tolerance : tolerance of the local error.
 
     Returns
     -------
     RunBlock
-        A run that breaks off is in it, cut and with its reason.
+        The samples of all runs. A run that fails has its samples up to the failure, and the reason.
 
     Raises
     ------
@@ -73,15 +77,15 @@ def solve_many(scenes: Sequence[Scene], tolerance: float) -> RunBlock:
         arrays[name] = np.empty((*time.shape, *shape))
     block = RunBlock(time, arrays, [Integration(False)] * runs, [0] * runs)
 
-    # For each rotor: its parameters, those of the equations, then those of the tips; and its
-    # structure. Rotors of one structure share compiled code.
+    # For each rotor its parameters (those of the equations, then those of the tips), and the
+    # structure of its equations. Rotors of equal structure share compiled code.
     rotors: dict[tuple[object, ...], tuple[Array, tuple[int, ...]]] = {}
-    groups: dict[tuple[int, ...], list[int]] = {}
-    keys: dict[int, tuple[object, ...]] = {}  # rotor and unit of work of each run
+    groups: dict[tuple[int, ...], list[int]] = {}  # numbers of the runs of each structure
+    keys: dict[int, tuple[object, ...]] = {}  # for each run its key in `rotors`
     for i, scene in enumerate(scenes):
         if not scene.has_constant_loads:
-            # It is integrated from one kink of its loads to the next, which are at other times in
-            # each run.
+            # A run is integrated from one kink of its loads to the next. The kinks of different
+            # runs are at different times, so that the runs cannot share lanes.
             run = solve("lagrange/taylor", scene, {"tolerance": tolerance})
             n = len(run.trajectory.time)
             for name, values in block.quantities.items():
@@ -108,17 +112,17 @@ def solve_many(scenes: Sequence[Scene], tolerance: float) -> RunBlock:
 
 
 def _tip_numbers(scene: Scene, parameters: Parameters) -> list[tuple[list[Any], Lean | None]]:
-    """Return tip (m), and cosines and sines of cone and tilt, of each blade as parameters.
+    """Return parameters for each blade's tip (m), and for cosines and sines of its cone and tilt.
 
     Parameters
     ----------
     scene : the rotor.
-    parameters : to which these numbers are added, after those of the equations.
+    parameters : the parameters of the equations. Those of the tips are added to them.
 
     Returns
     -------
     list
-        [] where the tips are not requested.
+        (blades,) tip, and a Lean or None; [] if the scene does not request the tips.
     """
     if not scene.wants("tip"):
         return []
@@ -127,7 +131,12 @@ def _tip_numbers(scene: Scene, parameters: Parameters) -> list[tuple[list[Any], 
 
 
 def _momenta(example: Scene) -> Any:
-    """Compile the momenta as a function of angles and rates."""
+    """Return a compiled function that computes the momenta from angles and rates.
+
+    Parameters
+    ----------
+    example : a scene of the structure.
+    """
     form, _, _ = taylor.equation_numbers(example, Parameters())
     angles, rates = taylor.state_symbols(form)
     rows = hamilton.momenta(angles, rates, form, heyoka().sin, heyoka().cos)
@@ -135,10 +144,10 @@ def _momenta(example: Scene) -> Any:
 
 
 def _observables(example: Scene) -> Any:
-    """Compile rates, and the tips and energies that are requested, as a function of the state.
+    """Return a compiled function that computes rates, tips and energies from angles and momenta.
 
-    The state is in angles and momenta. The code takes a tenth of NumPy's time for the same
-    formulas.
+    Tips and energies are computed only if the scene requests them. The compiled code takes a tenth
+    of NumPy's time for the same formulas.
 
     Parameters
     ----------
@@ -150,7 +159,7 @@ def _observables(example: Scene) -> Any:
     angles, momenta = taylor.state_symbols(form)
     rates = hamilton.rates(angles, momenta, form, engine.sin, engine.cos)
     moving = dict(zip(example.moving_coordinates, angles, strict=True))
-    # The angle of a pitch that is fixed is a parameter: it differs from run to run.
+    # The angle of a fixed pitch is a parameter, because it differs from run to run.
     pitches = []
     for coordinate in range(1, 1 + len(example.blades)):
         if coordinate in moving:
@@ -169,9 +178,16 @@ def _observables(example: Scene) -> Any:
 
 
 def _compiled_rows(example: Scene, rows: Sequence[Any], variables: Sequence[Any]) -> Any:
-    """Compile expressions as a function of variables."""
-    # Where all terms of a row vanish, the closed form gives the number zero, but the engine
-    # takes expressions only.
+    """Return a compiled function that computes expressions, one per row, from variables.
+
+    Parameters
+    ----------
+    example : a scene of the structure.
+    rows : the expressions.
+    variables : the symbols whose values are given to the function.
+    """
+    # If all terms of an expression vanish, the closed form returns the number zero, but the engine
+    # takes only expressions.
     expressions = [heyoka().expression(0.0) + row for row in rows]
     return heyoka().cfunc(expressions, variables, compact_mode=taylor.is_compact(example))
 
@@ -179,24 +195,26 @@ def _compiled_rows(example: Scene, rows: Sequence[Any], variables: Sequence[Any]
 def _observed(function: Any, states: Array, numbers: Array) -> Array:
     """Evaluate compiled code at the states of several runs.
 
-    The runs must fill the lanes: what is left over is rounded by other instructions.
+    The number of runs must be a multiple of the number of lanes. Otherwise the engine computes the
+    last runs by other instructions, which round differently.
 
     Parameters
     ----------
-    function : of `_compiled_rows`.
-    states : (variables, runs, samples), of what moves.
-    numbers : (parameters, runs) as of `_Group`.
+    function : result of `_compiled_rows`.
+    states : (variables, runs, samples) states of the coordinates that move.
+    numbers : (parameters, runs) parameters of the runs, see `_Group`.
 
     Returns
     -------
     ndarray, shape (rows, runs, samples)
+        The value of each expression at each sample.
     """
     _, runs, samples = states.shape
     parts = []
     for i in range(0, samples, _OBSERVED_PER_CALL):
         part = states[: function.nvars, :, i : i + _OBSERVED_PER_CALL]
         count = part.shape[2]
-        # The engine takes the parameters once for every state.
+        # The engine needs a copy of the parameters for every state.
         spread = np.broadcast_to(
             numbers[: function.nparams, :, None], (function.nparams, runs, count)
         )
@@ -208,7 +226,7 @@ def _observed(function: Any, states: Array, numbers: Array) -> Array:
 
 
 class _Group:
-    """Run the scenes of one structure by the code that is compiled for them."""
+    """Run the scenes whose equations have one structure, by shared compiled code."""
 
     def __init__(
         self,
@@ -218,15 +236,15 @@ class _Group:
         numbers: Array,
         tolerance: float,
     ) -> None:
-        """Compile the code, or take what is compiled for another group of the structure.
+        """Compile the code, or take code that was compiled for another group of the same structure.
 
         Parameters
         ----------
-        places : (runs,) of each run in the block.
-        scenes : (runs,) which agree in structure.
-        structure : of their equations.
-        numbers : (parameters, runs) of their rotors.
-        tolerance : of the local error.
+        places : (runs,) number of each run in the block.
+        scenes : (runs,) scenes whose equations have the same structure.
+        structure : what the compiled code of these equations depends on.
+        numbers : (parameters, runs) parameters of the rotors.
+        tolerance : tolerance of the local error.
         """
         example = scenes[0]
         self.places, self.scenes = places, scenes
@@ -259,15 +277,15 @@ class _Group:
         self.times = np.linspace(
             0.0, np.array([scene.duration for scene in scenes]), example.samples
         )
-        # The rotor's parameters, then the angles of the pitches that are fixed.
+        # (parameters, runs): the rotor's parameters, then the angles of the fixed pitches.
         self.numbers = np.concatenate([numbers, angles[fixed]])
 
     def run(self, block: RunBlock) -> None:
-        """Run all scenes of the group, in chunks that stay in the processor's cache.
+        """Run all scenes of the group, in chunks whose samples stay in the processor's cache.
 
         Parameters
         ----------
-        block : where the runs are written.
+        block : block to which the samples are written.
         """
         width = self.integrator.state.shape[1]
         runs = len(self.scenes)
@@ -277,18 +295,19 @@ class _Group:
             padded = columns + [columns[-1]] * (-len(columns) % width)
             states, observed, integrations = self.solve(padded)
             self.put(block, padded, states, observed, integrations[: len(columns)])
-            # A run whose angles are huge, or that failed, may have had an effect on other lanes.
-            sizes = np.maximum(states.max(axis=2), -states.min(axis=2))  # NaN where a sample is
+            # A run that failed, or has huge angles, may have had an effect on the other lanes.
+            # `sizes` has the largest magnitude of each variable; NaN if a sample is NaN.
+            sizes = np.maximum(states.max(axis=2), -states.min(axis=2))
             angles = sizes[: len(sizes) // 2]
             independent = (angles < _HUGE).all(axis=0) & np.isfinite(sizes).all(axis=0)
             independent &= [integration.success for integration in integrations]
             affected = {i // width for i in np.flatnonzero(~independent).tolist()}
             for i in [i for i in range(len(columns)) if i // width in affected]:
-                # One lane's failure ends all lanes. So each of these runs is repeated, with a copy
-                # of it in every lane.
+                # If one lane fails, all lanes end. Therefore each run of these lanes is repeated
+                # alone, with a copy of it in every lane.
                 alone = [columns[i]] * width
                 states, observed, integrations = self.solve(alone)
-                # What follows the first sample that is not finite is no motion.
+                # Samples after the first one that is not finite are no motion.
                 is_lost = ~np.isfinite(states).all(axis=0)
                 states[:, np.maximum.accumulate(is_lost, axis=1)] = np.nan
                 self.put(block, alone, states, observed, integrations[:1])
@@ -298,23 +317,23 @@ class _Group:
 
         Parameters
         ----------
-        columns : of the runs in this group; they fill the lanes in turn.
+        columns : numbers of the runs in this group, in the order in which they fill the lanes.
 
         Returns
         -------
         states : ndarray, shape (variables, columns, samples)
-            In rates.
+            Angles, rates and, if it is integrated, the work.
         observed : ndarray, shape (rows, columns, samples)
             Tips and energies.
         integrations : list of Integration
-            The engine's status of each column.
+            The engine's report on each column.
         """
         width = self.integrator.state.shape[1]
         initial, times = self.initial[:, columns], self.times[:, columns]
         numbers = self.numbers[:, columns]
         states = np.empty((len(initial), len(columns), len(times)))
         half, integrations = len(self.moving), []
-        # The equations are in momenta.
+        # The equations have momenta in place of rates.
         start = initial.copy()
         start[half : 2 * half] = _observed(self.momenta, initial[:, :, None], numbers)[:, :, 0]
         for i in range(0, len(columns), width):
@@ -327,7 +346,7 @@ class _Group:
             for result in self.integrator.propagate_res:
                 message = failure(result[0])
                 integrations.append(Integration(not message, message, 0.0, int(result[3])))
-        states[:, :, 0] = start  # set also where a run fails in its first step
+        states[:, :, 0] = start  # set here, because a run may fail in its first step
         observed = _observed(self.observables, states, numbers)
         states[half : 2 * half] = observed[:half]
         states[:, :, 0] = initial
@@ -345,10 +364,11 @@ class _Group:
 
         Parameters
         ----------
-        block : where the runs are written.
-        columns : of the runs in this group.
-        states, observed : as of `solve`.
-        integrations : the engine's status of these runs; columns beyond only fill the lanes.
+        block : block to which the samples are written.
+        columns : numbers of the runs in this group.
+        states, observed : see `solve`.
+        integrations : the engine's reports on the runs to be written. The other columns are copies
+            that only fill the lanes.
         """
         runs, count = len(integrations), len(self.moving)
         states, observed = states[:, :runs], observed[:, :runs]
