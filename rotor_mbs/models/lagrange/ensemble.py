@@ -23,8 +23,9 @@ from rotor_mbs.models.lagrange.samples import constant_work
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.trajectory import Array, Integration, RunBlock
 
-# Largest angle (rad) in a lane that has no effect on other lanes. If one lane has an angle of 1e14
-# rad or more, the sines of all lanes are computed in another way, and are rounded differently.
+# A lane whose angles are below this (rad) has no effect on the other lanes. If one lane has an
+# angle of 1e14 rad or more, the sines of all lanes are computed in another way and are rounded
+# differently.
 _HUGE = 1e13
 
 _ENERGIES = ("kinetic_energy", "potential_energy", "work")

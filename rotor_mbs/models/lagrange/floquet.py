@@ -1,7 +1,8 @@
 """Find the periodic motion of a rotor that turns under gravity, and its linear stability.
 
-At a mean speed the rotor is one turn further after each period. The eigenvalues of the state
-transition matrix over one turn are the Floquet multipliers. Needs heyoka.
+In the periodic motion at a mean speed, the state repeats itself after each period, except that the
+rotor is one turn further. The eigenvalues of the state transition matrix over one period are the
+Floquet multipliers. The module needs heyoka.
 """
 
 from __future__ import annotations
@@ -31,57 +32,66 @@ from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import value_at
 from rotor_mbs.solution.trajectory import Array
 
-# What is left of a turn's mismatch, in rad and in shares of the speed: Newton's method ends at the
-# first, and its best state counts as periodic below the second. (A multiplier of 1e9 amplifies the
-# rounding of 1e-16 to 1e-7.)
+# Limits of the mismatch: the difference between the states at the end and at the start of a turn,
+# in rad for angles and in shares of the speed for rates. Newton's method ends below _CLOSED. Its
+# best state counts as periodic up to _ACCEPTED. Rounding does not allow more in general: a
+# multiplier of 1e9 amplifies rounding errors of 1e-16 to 1e-7.
 _CLOSED = 1e-13
 _ACCEPTED = 1e-9
-_MAX_CORRECTIONS = 12
-# Of the integrator: a turn of a stiff bearing takes about two steps for each of its oscillations; a
-# rotor that has left the periodic motion takes more and more.
+_MAX_CORRECTIONS = 12  # largest number of Newton steps
+# Largest number of integration steps in a turn: a constant, plus a number for each oscillation of
+# the stiffest bearing, which takes about two steps. A rotor that has left the periodic motion would
+# take more and more steps.
 _STEPS, _STEPS_PER_OSCILLATION = 500, 10
-_MOST_STEPS = 10**9  # days of computing: a turn that may take more is not begun
-# rad, or shares of the speed: from a mismatch above this Newton's method is given up.
+_MOST_STEPS = 10**9  # these steps take days: a turn that may need more is not begun
+# Mismatch (rad, or shares of the speed) above which Newton's method is given up.
 _LOST = 20.0
 
 
 @dataclass(frozen=True)
 class Turn:
-    """Hold a motion that repeats itself after a turn, and the growth of deviations over it."""
+    """Hold a periodic motion over one turn, and the growth of small deviations over the turn.
 
-    speed: float  # rad/s, of the rotor, averaged over the turn
-    # (2n,) angles in rad and rates in rad/s at its start, of the coordinates that move
-    start: Array
-    torque: float  # N m on the rotor, constant: what the dampers take in a turn is put in by it
+    The state has the angles, then the rates, of the n coordinates that move.
+    """
+
+    speed: float  # rad/s, mean speed of the rotor over the turn
+    start: Array  # (2n,) rad, then rad/s, state at the start of the turn
+    # N m, constant torque on the rotor; its work in a turn is the energy that the dampers dissipate
+    torque: float
     transition: Array  # (2n, 2n) state transition matrix over the turn
-    # (2n,) derivative at the start of what the motion keeps, energy less the torque's work; zero
-    # where dampers take energy
+    # (2n,) derivative, by the state at the start, of the energy minus the work of the torques,
+    # which the motion conserves; zero if the rotor has dampers
     gradient: Array
     flow: Array  # (2n,) time derivative of the state at the start
-    # ∫ tr A dt over the turn, A the derivative of the state's rate by the state: the logarithm of
-    # the determinant of `transition`, computed without it
+    # ∫ tr A dt over the turn, where A is the derivative of the state's time derivative by the
+    # state. It equals the logarithm of the determinant of `transition`, but is computed
+    # independently of `transition`.
     trace_integral: float
-    # largest difference between end and start: rad, and rates as shares of the speed
+    # largest difference between the states at the end and the start, apart from the turn of the
+    # rotor; rad for angles, shares of the speed for rates
     mismatch: float
-    message: str = ""  # why no periodic motion was found; "" where it was
+    message: str = ""  # why no periodic motion was found; "" if one was found
 
 
 def periodic_turn(scene: Scene, speed: float, guess: Turn | None = None) -> Turn:
     """Find the periodic motion of a rotor at a mean speed, by Newton's method.
 
-    The unknowns are the torque and the state at the start, except for the rotor angle, which
-    remains the scene's initial one.
+    The unknowns are the torque and the state at the start of a turn. The rotor angle of this state
+    is no unknown: it is the initial rotor angle of the scene.
 
     Parameters
     ----------
-    scene : the rotor; its pitch torques and rest angles as at t = 0.
-    speed : rad/s, not 0; below 0 the rotor turns the other way.
-    guess : a motion at a speed nearby; steady rotation without gravity where left out.
+    scene : the rotor. Its pitch torques and rest angles keep their values of t = 0.
+    speed : rad/s, not 0; negative if the rotor turns in the other direction.
+    guess : the periodic motion at a speed nearby, with which Newton's method begins; by default
+        steady rotation without gravity.
 
     Returns
     -------
     Turn
-        Its `message` says why, if no such motion was found; all numbers but the speed are NaN then.
+        The periodic motion. If none was found, `message` says why, and all numbers except the speed
+        are NaN.
 
     Raises
     ------
@@ -117,8 +127,7 @@ def periodic_turn(scene: Scene, speed: float, guess: Turn | None = None) -> Turn
             residual = (end - state - shift) / units
             mismatch = float(np.abs(residual).max())
             if best is None or mismatch < best.mismatch:
-                # Gradient of energy less the torques' work, zero where dampers act; and the state's
-                # time derivative.
+                # Compute `Turn.gradient` and `Turn.flow`.
                 loads, gradient = loads_at_start(scene, torque), slopes(energy, state)
                 gradient[:n] -= [torque, *loads.pitches]
                 gradient = np.zeros(2 * n) if scene.has_damping else gradient
@@ -130,8 +139,8 @@ def periodic_turn(scene: Scene, speed: float, guess: Turn | None = None) -> Turn
                 best = Turn(speed, state, torque, by_state, gradient, flow, trace, mismatch)
             if mismatch < _CLOSED or mismatch > _LOST:
                 break
-            # The unknowns: the torque, and the state without the rotor's angle, which is fixed.
-            # They differ in units: each column is scaled to length one.
+            # The columns of the Jacobian belong to the torque and to the state without the rotor
+            # angle. They have different units. Each column is therefore scaled to length one.
             jacobian = (
                 np.column_stack([by_torque, (by_state - np.eye(2 * n))[:, 1:]]) / units[:, None]
             )
@@ -153,14 +162,14 @@ def periodic_turn(scene: Scene, speed: float, guess: Turn | None = None) -> Turn
 
 
 class _Variational:
-    """Integrate the closed form with its first variational equations by state and torque."""
+    """Integrate the closed form, and the derivatives of its state by initial state and torque."""
 
     def __init__(self, scene: Scene) -> None:
-        """Compile the equations, or take what is compiled for a scene of the same structure.
+        """Compile the equations, or take those compiled for a scene of the same structure.
 
         Parameters
         ----------
-        scene : the rotor; its pitch torques and rest angles as at t = 0.
+        scene : the rotor. Its pitch torques and rest angles keep their values of t = 0.
         """
         engine = heyoka()
         parameters = Parameters()
@@ -196,17 +205,18 @@ class _Variational:
 
         Parameters
         ----------
-        state : (2n,) at the start, angles (rad), then rates (rad/s).
-        torque : N m on the rotor.
-        period : s.
+        state : (2n,) state at the start of the turn, angles (rad), then rates (rad/s).
+        torque : N m, torque on the rotor.
+        period : s, duration of the turn.
 
         Returns
         -------
         end : ndarray, shape (2n,)
+            State at the end of the turn.
         derivatives : ndarray, shape (2n, 2n + 1)
-            Of the end by the initial state, then by the torque.
+            Derivatives of `end` by the state at the start, then by the torque.
         trace : float
-            ∫ tr A dt, as in `Turn.trace_integral`.
+            ∫ tr A dt, see `Turn.trace_integral`.
 
         Raises
         ------

@@ -1,8 +1,12 @@
 """Evaluate the closed form in Hamilton's variables, angles and momenta p = ∂T/∂q̇.
 
-Sweeps are integrated in them, in fewer and cheaper steps. Symbols as in `closed_form`:
-p_0 = (J_hub + Σ A) Ω + Σ B θ̇,  p_i = B Ω + Jzz θ̇,
-ṗ_0 = torque - ∂V/∂q2,  ṗ_i = ½ ∂A/∂θ Ω² + ∂B/∂θ Ω θ̇ - ∂V/∂θ, and what dampers and torques do.
+Sweeps are integrated in these variables, because the steps are fewer and cheaper. With the symbols
+of `closed_form`, momenta and forces are
+
+    p_0 = (J_hub + Σ A) Ω + Σ B θ̇,  p_i = B Ω + Jzz θ̇,
+    ṗ_0 = Q_0 - ∂V/∂q2,  ṗ_i = Q_i + ½ ∂A/∂θ Ω² + ∂B/∂θ Ω θ̇ - ∂V/∂θ,
+
+where Q has the moments of torques and dampers.
 """
 
 from __future__ import annotations
@@ -27,7 +31,7 @@ def momenta(
 
     Parameters
     ----------
-    angles, rates, form, sin, cos : as of `closed_form.accelerations`.
+    angles, rates, form, sin, cos : see `closed_form.accelerations`.
     """
     spin, total, of_pitches = rates[0], form.inertia * rates[0], []
     for blade, theta, rate in zip(form.blades, angles[1:], rates[1:], strict=True):
@@ -49,15 +53,15 @@ def momenta(
 def rates(
     angles: Numbers, momenta: Numbers, form: RotorForm, sin: Function, cos: Function
 ) -> list[Any]:
-    """Return the rates (rad/s) that belong to momenta: the inverse of `momenta`.
+    """Return the rates (rad/s) that belong to momenta, the inverse of the function `momenta`.
 
-    Computed by the Schur complement; singular where that is 0.
+    The rates are computed by the Schur complement S. They are singular where S = 0.
 
     Parameters
     ----------
     angles : (1 + len(form.blades),) rad, of the rotor, then of the pitches that move.
-    momenta : kg m²/s, likewise.
-    form, sin, cos : as of `closed_form.accelerations`.
+    momenta : (1 + len(form.blades),) kg m²/s, in the same order.
+    form, sin, cos : see `closed_form.accelerations`.
     """
     schur, rest = form.inertia, momenta[0]
     ratios = []
@@ -86,7 +90,7 @@ def forces(
 
     Parameters
     ----------
-    angles, rates, form, loads, sin, cos : as of `closed_form.accelerations`.
+    angles, rates, form, loads, sin, cos : see `closed_form.accelerations`.
     """
     sine, cosine = sin(angles[0]), cos(angles[0])
     spin, of_pitches = rates[0], []
@@ -115,9 +119,10 @@ def forces(
 
 @functools.lru_cache(maxsize=16)
 def resting_pitches(scene: Scene) -> tuple[int, ...]:
-    """Return the coordinates of the pitches that the equations always leave at zero.
+    """Return the coordinates of the pitches that stay at zero during the whole run.
 
-    They start there at rest, without a load, and nothing that the rotor does moves them.
+    Such a pitch starts at zero and at rest, no load acts on it, and neither gravity nor any motion
+    of the rotor moves it.
 
     Parameters
     ----------
@@ -138,24 +143,25 @@ def resting_pitches(scene: Scene) -> tuple[int, ...]:
     return tuple(resting)
 
 
-# Cosine and sine of an azimuth, and a rotor rate: with four, a force α Ω² + β sin φ + γ cos φ + δ
-# that is zero at all of them is zero everywhere.
+# Four states of the rotor: cosine and sine of the azimuth φ, and rate Ω. A force
+# α Ω² + β sin φ + γ cos φ + δ that is zero in these four states is zero in all states.
 _ROTOR_STATES = ((1, 0, 1), (0, 1, 2), (-1, 0, 3), (0, -1, 5))
 
 
 @functools.lru_cache(maxsize=256)
 def _stays_at_zero(blade: BladeForm) -> bool:
-    """Return whether a pitch without a load stays at zero, whatever the rotor does.
+    """Return whether a pitch without a load, at zero and at rest, stays there.
 
-    It does if its momentum and force vanish there at any azimuth and rotor rate.
+    It stays there if its momentum and the force on it vanish at every azimuth and rotor rate.
 
     Parameters
     ----------
-    blade : its coefficients as Fractions, so that the result is exact.
+    blade : the blade's coefficients as Fractions, so that the result is exact.
     """
     form = RotorForm((blade,), (), Fraction(0), Fraction(0))
     for cos_q, sin_q, spin in _ROTOR_STATES:
-        # Sine and cosine by key: "rotor" for the rotor's angle, 0 for the pitch.
+        # The angles are replaced by keys, "rotor" for the rotor angle and 0 for the pitch, by which
+        # `momenta` and `forces` look up exact sines and cosines.
         sines, cosines = (
             {"rotor": Fraction(sin_q), 0: Fraction(0)},
             {"rotor": Fraction(cos_q), 0: Fraction(1)},

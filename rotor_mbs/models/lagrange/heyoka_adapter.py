@@ -1,6 +1,6 @@
-"""Adapt heyoka: symbols and parameters, Taylor integrators, quad precision numbers.
+"""Import heyoka, and convert numbers to its parameters and to its quad precision.
 
-No other module imports it.
+No other module imports heyoka. They get it from the function `heyoka`.
 """
 
 from __future__ import annotations
@@ -22,38 +22,41 @@ _HINT = "it comes with rotor_mbs on Linux (pip install heyoka) and from conda-fo
 
 @functools.cache
 def heyoka() -> ModuleType:
-    """Return the engine, imported at the first call.
+    """Return the module heyoka, which is imported at the first call.
 
     Raises
     ------
     MethodRefusal
-        If it is not installed, with the way to get it.
+        If heyoka is not installed. The message says how to install it.
     ResourceError
-        If it is installed and cannot be loaded.
+        If heyoka is installed and cannot be loaded.
     """
     try:
         import heyoka as engine
     except MemoryError as exc:
         raise ResourceError("heyoka cannot be loaded: not enough memory") from exc
     except ImportError as exc:
-        # It is installed, but the system could not load it.
+        # heyoka is installed, but the system could not load it.
         if not isinstance(exc, ModuleNotFoundError):
             raise ResourceError(f"heyoka cannot be loaded: {exc}") from exc
         raise MethodRefusal(
             f"heyoka is not installed: {_HINT}; lagrange/dop853 needs SciPy only"
         ) from exc
     if not _is_writable(engine.llvm_state.get_diskcache_path()):
-        # The engine would warn twice of every system that it compiles.
+        # Without a writable folder the engine would print two warnings for every system that it
+        # compiles.
         engine.llvm_state.set_diskcache_enabled(False)
     return engine  # type: ignore[no-any-return]
 
 
 def _is_writable(cache: Path) -> bool:
-    """Return whether the engine can keep compiled code in a folder, which is made if missing.
+    """Return whether the engine can store compiled code in its cache folder.
+
+    The folder is created if it does not exist.
 
     Parameters
     ----------
-    cache : the engine's folder; an empty path, where there is no home folder.
+    cache : cache folder of the engine; an empty path if there is no home folder.
     """
     if cache == Path():
         return False
@@ -65,7 +68,7 @@ def _is_writable(cache: Path) -> bool:
 
 
 def is_available() -> bool:
-    """Return whether heyoka is installed; this imports it."""
+    """Return whether heyoka is installed, after an attempt to import it."""
     try:
         heyoka()
     except MethodRefusal:
@@ -79,21 +82,23 @@ def compile_anew() -> None:
 
 
 class Parameters:
-    """Turn numbers into runtime parameters of compiled code.
+    """Convert numbers to runtime parameters of compiled code.
 
-    Equal numbers share one parameter, and exact zeros vanish from the equations. One compiled
-    integrator serves every scene of an equal structure.
+    Equal numbers share one parameter. An exact zero becomes no parameter, so that its terms vanish
+    from the equations. Scenes with equal `structure` share compiled code.
 
     Attributes
     ----------
-    values : the numbers that became parameters.
-    structure : index in `values` of every number in the order of the calls; -1 for zero.
+    values : the value of each parameter.
+    structure : for each converted number, in the order of the calls, its index in `values`; -1 for
+        zero.
     """
 
     def __init__(self) -> None:
         self.values: list[Fraction] = []
         self.structure: list[int] = []
-        self._known: dict[tuple[int, int], int] = {}  # a fraction's own hash is slow
+        # Index in `values` by numerator and denominator. To hash a Fraction would be slow.
+        self._known: dict[tuple[int, int], int] = {}
 
     def __call__(self, value: Fraction) -> Any:
         if value == 0:
@@ -106,9 +111,9 @@ class Parameters:
         return self._parameter(self._known[key])
 
     def own(self, value: Fraction) -> Any:
-        """Return a parameter that no other number shares, even if zero or equal to another.
+        """Return a parameter that no other number shares, even if it is zero or equal to another.
 
-        For numbers that change during a run, or from run to run.
+        Numbers that change during a run, or from run to run, need such a parameter.
         """
         self.values.append(value)
         return self._parameter(len(self.values) - 1)
@@ -119,9 +124,10 @@ class Parameters:
 
 
 def array_of(values: Sequence[Fraction], *, quad: bool) -> Any:
-    """Return numbers as an array of float64, or of real128 where `quad`.
+    """Return numbers as an array of float64, or of real128 if `quad`.
 
-    Each number is rounded once, in quad precision at most twice.
+    A double is the number rounded once. For a quad number the numerator, the denominator and their
+    quotient are rounded.
     """
     if not quad:
         return np.array([float(value) for value in values])
@@ -133,9 +139,9 @@ def array_of(values: Sequence[Fraction], *, quad: bool) -> Any:
 def quad_arithmetic() -> tuple[
     Callable[[Fraction], Any], Callable[[Any], Any], Callable[[Any], Any]
 ]:
-    """Return conversion to a quad number, and sine and cosine of arrays of quad numbers.
+    """Return three functions: conversion to a quad number, and sine and cosine of quad arrays.
 
-    The arrays hold the numbers as objects, which NumPy multiplies by doubles, too.
+    These arrays have the type object, because NumPy can multiply such arrays by doubles.
     """
     real128 = heyoka().real128
 
@@ -146,7 +152,12 @@ def quad_arithmetic() -> tuple[
 
 
 def failure(outcome: Any) -> str:
-    """Return why a propagation of the engine failed; "" where it reached the end."""
+    """Return why an integration by the engine failed; "" if it reached the end.
+
+    Parameters
+    ----------
+    outcome : the outcome that the engine returned.
+    """
     outcomes = heyoka().taylor_outcome
     if outcome == outcomes.time_limit:
         return ""

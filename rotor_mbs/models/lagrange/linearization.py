@@ -1,6 +1,6 @@
 """Linearize the closed form, and find its steady states.
 
-These are the equilibrium at rest, and steady rotation without gravity.
+A steady state is an equilibrium at rest, or steady rotation without gravity.
 """
 
 from __future__ import annotations
@@ -20,31 +20,32 @@ from rotor_mbs.models.lagrange.samples import loads_at_start
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.trajectory import Array, Linearization
 
-# rad: a step of Newton's method below this is followed by three more, and the state is found.
+# If a step of the search would be shorter than this (rad), three plain Newton steps end the search.
 _SMALL_STEP = 1e-6
-_MAX_STEPS = 200
-# Share of the weights' moments, and of a torque, that is taken for their rounding.
+_MAX_STEPS = 200  # largest number of steps of the search
+# A difference of moments counts as rounding if it is at most this share of the weights' moments, or
+# of the largest moment that balances a pitch torque.
 _ROUNDING = 1e-12
-# Of the coordinates that move: all, or all but the rotor.
+# Coordinates that a search may change, among those that move: all, or all except the rotor.
 _ALL, _PITCHES = slice(None), slice(1, None)
 
 
 def slopes(function: Function, values: Sequence[float] | Array) -> Array:
-    """Return the derivatives of an analytic function, exact to rounding, by an imaginary step.
+    """Return the derivatives of an analytic function by complex steps.
 
-    The complex-step derivative takes no difference of close numbers.
+    They are exact except for rounding, because no numbers that are nearly equal are subtracted.
 
     Parameters
     ----------
-    function : of n numbers, of which it returns one number or m.
-    values : (n,) where the derivatives are taken.
+    function : analytic function of a list of n numbers, which returns one number or m numbers.
+    values : (n,) numbers at which the derivatives are computed.
 
     Returns
     -------
     ndarray, shape (n,) or (m, n)
     """
     step = 1e-30
-    # Row i: number i in each of the n directions, of which direction i changes it.
+    # Row i has number i for the n directions. Only direction i changes it.
     moved = np.asarray(values)[:, None] + 1j * step * np.eye(len(values))
     return np.asarray(np.imag(function(list(moved))) / step)
 
@@ -56,9 +57,9 @@ def linearize(
 
     Parameters
     ----------
-    scene : the rotor; its other loads as at t = 0.
-    angles, rates : (1 + blades,) rad and rad/s.
-    torque : N m on the rotor, in place of the scene's.
+    scene : the rotor. Its loads, except the rotor torque, keep their values of t = 0.
+    angles, rates : (1 + blades,) rad and rad/s, the state.
+    torque : N m, rotor torque that replaces that of the scene.
 
     Returns
     -------
@@ -68,7 +69,7 @@ def linearize(
     Raises
     ------
     ZeroDivisionError
-        At the singular configuration.
+        If the mass matrix is singular at this state.
     """
     form, columns, loads = (
         rotor_form(scene),
@@ -81,27 +82,29 @@ def linearize(
     def accelerations(state: Sequence[Any], sin: Function, cos: Function) -> list[Any]:
         return closed_form.accelerations(state[:n], state[n:], form, loads, sin, cos)
 
-    # On floats, and first: their division by zero raises, that of arrays does not.
+    # Computed on floats, and before the derivatives, because a division by zero raises an error for
+    # floats, but not for arrays.
     residual = np.array(accelerations(state, math.sin, math.cos))
     derivatives = slopes(lambda state: accelerations(state, np.sin, np.cos), state)
     return Linearization(-derivatives[:, :n], -derivatives[:, n:], residual)
 
 
 def holding_torque(scene: Scene, speed: float) -> float:
-    """Return the torque (N m) that keeps the rotor's `speed` (rad/s) against the shaft's damper."""
+    """Return the rotor torque (N m) that balances the shaft's damper at a speed (rad/s)."""
     return scene.shaft_damping * speed
 
 
 def steady_rotation(scene: Scene, speed: float) -> Array:
     """Return the angles at which the rotor turns steadily without gravity.
 
-    Finds a stationary point of V - ½ Ω² a - Σ τ θ, downhill from the scene's initial pitches. These
-    are kept where they are stationary already, stable or not. The rotor keeps its initial angle.
+    The pitches are a stationary point of V - ½ Ω² Σ A - Σ Q θ, with the symbols of `closed_form`
+    and the pitch torques Q. The search goes downhill from the scene's initial pitches. If these are
+    stationary, they are returned, even if they are unstable. The rotor keeps its initial angle.
 
     Parameters
     ----------
-    scene : the rotor; its pitch torques and rest angles as at t = 0.
-    speed : rad/s, of the rotor.
+    scene : the rotor. Its pitch torques and rest angles keep their values of t = 0.
+    speed : rad/s, speed of the rotor.
 
     Returns
     -------
@@ -111,22 +114,22 @@ def steady_rotation(scene: Scene, speed: float) -> Array:
     Raises
     ------
     InputError
-        If a pitch torque is larger than all that can balance it, no such state is found within
-        200 steps, or rounding of the energies hides it.
+        If a pitch torque is larger than gravity, rotation and spring can balance, if no steady
+        state is found within 200 steps, or if rounding of the energies makes the state inaccurate.
     """
     still = replace(scene, gravity=0.0)
     return _checked(still, speed, _stationary(still, speed, _PITCHES))
 
 
 def equilibrium(scene: Scene) -> Array:
-    """Return the angles at which the rotor rests without a torque, found as by `steady_rotation`.
+    """Return the angles at which the rotor rests without a rotor torque.
 
-    A balanced rotor (`is_balanced`) keeps its initial angle. Any other rotor turns downhill as
-    well, from the initial angles.
+    The search is that of `steady_rotation`. A balanced rotor (`is_balanced`) keeps its initial
+    angle. For any other rotor the search also changes the rotor angle.
 
     Parameters
     ----------
-    scene : the rotor and gravity; its pitch torques and rest angles as at t = 0.
+    scene : the rotor and gravity. Its pitch torques and rest angles keep their values of t = 0.
 
     Returns
     -------
@@ -136,13 +139,13 @@ def equilibrium(scene: Scene) -> Array:
     Raises
     ------
     InputError
-        As `steady_rotation`.
+        In the same cases as `steady_rotation`.
     """
     if not scene.gravity:
         return steady_rotation(scene, 0.0)
     try:
         angles = _stationary(scene, 0.0, _PITCHES)
-    except _NotFoundError:  # at another rotor angle there may be one
+    except _NotFoundError:  # an equilibrium may exist at another rotor angle
         angles = None
     if angles is None or not is_balanced(scene, angles):
         angles = _stationary(scene, 0.0, _ALL)
@@ -150,20 +153,20 @@ def equilibrium(scene: Scene) -> Array:
 
 
 def is_balanced(scene: Scene, angles: Sequence[float] | Array) -> bool:
-    """Return whether gravity gives a rotor at rest no preferred angle.
+    """Return whether a rotor under gravity can rest at any rotor angle.
 
-    It has none if the rotor's torque is zero at `angles`, and remains zero to first order where the
-    rotor is turned and the pitches follow: both up to the rounding of the weights that balance.
-    Bearing springs move the pitches of equal blades once a turn, so that their weights balance to
-    third order of the deflection only: on stiff bearings that is rounding, on soft ones the rotor
-    has a preferred angle.
+    It can if two torques are zero up to rounding: the torque of the weights on the rotor at
+    `angles`, and its change to first order if the rotor is turned and the pitches follow. Equal
+    blades on bearing springs may fail the second condition. Their pitches change as the rotor
+    turns, and their weights balance only to third order in these changes. On stiff bearings the
+    remaining torque is below rounding. On soft bearings the rotor has a preferred angle.
 
     Parameters
     ----------
     scene : Scene
-        With gravity.
+        The rotor and gravity, which is not 0.
     angles : sequence of float
-        (1 + blades,) rad, at which the pitches are in equilibrium.
+        (1 + blades,) rad, angles at which the pitches are in equilibrium.
     """
     form = rotor_form(scene)
     angles = np.asarray(angles, dtype=float)[scene.moving_coordinates]
@@ -176,19 +179,20 @@ def is_balanced(scene: Scene, angles: Sequence[float] | Array) -> bool:
 
 
 def weight_stiffness(scene: Scene, angles: Sequence[float] | Array) -> float:
-    """Return the moments of all weights about the shaft, divided by the rotor's inertia, in 1/s².
+    """Return the sum of all weights' moments, divided by the rotor's inertia, in 1/s².
 
-    This is the size of the stiffness of a rotor whose weights do not balance, and the unit of
-    rounding where they do.
+    If the weights do not balance, the stiffness of the rotor has this magnitude. If they balance,
+    rounding errors of the stiffness are relative to it.
 
     Parameters
     ----------
     scene : the rotor and gravity.
-    angles : (1 + blades,) rad, at which the rotor's inertia is taken.
+    angles : (1 + blades,) rad, angles at which the rotor's inertia is computed.
     """
     form, loads = rotor_form(scene), loads_at_start(scene)
     moving = [float(angles[column]) for column in scene.moving_coordinates]
-    turning = [1.0] + [0.0] * len(form.blades)  # at 1 rad/s the kinetic energy is half the inertia
+    # At a rotor rate of 1 rad/s the kinetic energy is half the rotor's inertia.
+    turning = [1.0] + [0.0] * len(form.blades)
     half_inertia, _ = closed_form.energies(moving, turning, form, loads, math.sin, math.cos)
     weights = _weights(form)
     return weights / (2.0 * half_inertia) if weights else 0.0
@@ -199,30 +203,30 @@ class _NotFoundError(InputError):
 
 
 def _shown(speed: float) -> str:
-    """Return a rotor speed in rad/s, and in rpm, as text."""
+    """Return a rotor speed (rad/s) as text in rad/s, and in rpm if it is not 0."""
     rpm = f" ({speed * 30.0 / math.pi:.4g} rpm)" if speed else ""
     return f"{speed:g} rad/s{rpm}"
 
 
 class _Potential(NamedTuple):
-    """Hold V - T, and its derivatives by the angles."""
+    """Hold the amended potential V - T, and its derivatives by the n angles."""
 
     value: float  # J
-    slope: Array  # (n,) N m
-    curvature: Array  # (n, n) N m/rad
+    slope: Array  # (n,) N m, first derivatives
+    curvature: Array  # (n, n) N m/rad, second derivatives
 
 
 def _stationary(scene: Scene, speed: float, free: slice) -> Array:
     """Return the angles at which the forces on the free coordinates are zero.
 
-    Newton's method with the absolute eigenvalues of the Hessian, and a step halved until it goes
-    downhill.
+    The search starts at the scene's initial angles. It is Newton's method with the absolute values
+    of the Hessian's eigenvalues. Each step is halved until it goes downhill.
 
     Parameters
     ----------
-    scene : the rotor, its loads as at t = 0, and gravity; its initial angles are the start.
-    speed : rad/s, of the rotor.
-    free : the coordinates to be changed, among those that move: `_ALL` or `_PITCHES`.
+    scene : the rotor and gravity. Its loads keep their values of t = 0.
+    speed : rad/s, speed of the rotor.
+    free : the coordinates that the search may change, `_ALL` or `_PITCHES`.
 
     Returns
     -------
@@ -232,8 +236,8 @@ def _stationary(scene: Scene, speed: float, free: slice) -> Array:
     Raises
     ------
     InputError
-        If a pitch torque is too large, or nothing is found within `_MAX_STEPS` steps
-        (`_NotFoundError`).
+        If a pitch torque is too large, or (`_NotFoundError`) if no such angles are found within
+        `_MAX_STEPS` steps.
     """
     form, columns, loads = rotor_form(scene), scene.moving_coordinates, loads_at_start(scene)
     _refuse_large_torques(scene, form, speed, loads)
@@ -260,24 +264,24 @@ def _stationary(scene: Scene, speed: float, free: slice) -> Array:
 
 
 def _refuse_large_torques(scene: Scene, form: RotorForm, speed: float, loads: LoadValues) -> None:
-    """Check that no pitch torque exceeds what gravity and rotation can balance without a spring.
+    """Check that gravity and rotation can balance the torque on each pitch without a spring.
 
     Parameters
     ----------
-    scene : gives names to the error.
+    scene : the scene, whose name and coordinates an error names.
     form : coefficients of the rotor.
-    speed : rad/s, of the rotor.
-    loads : at t = 0.
+    speed : rad/s, speed of the rotor.
+    loads : loads at t = 0.
 
     Raises
     ------
     InputError
-        If a pitch has no spring and a larger torque.
+        If they cannot balance it.
     """
     columns = scene.moving_coordinates[1:]
     for column, blade, torque in zip(columns, form.blades, loads.pitches, strict=True):
-        # The largest values over the pitch of x s + y c and of ½ ∂A/∂θ = ½ half_slope_sc sin 2θ +
-        # half_slope_cs cos 2θ
+        # Sum of the largest moment of the weight, and Ω² times a bound of ½ ∂A/∂θ, which is
+        # ½ half_slope_sc sin 2θ + half_slope_cs cos 2θ, plus slope_s s + slope_c c with a cone.
         largest = pitch_weight(blade)
         slope = math.hypot(0.5 * blade.half_slope_sc, blade.half_slope_cs)
         if blade.lean:
@@ -296,12 +300,12 @@ def _refuse_large_torques(scene: Scene, form: RotorForm, speed: float, loads: Lo
 def _checked(scene: Scene, speed: float, angles: Array) -> Array:
     """Return the angles of a steady state, after a check that the accelerations vanish there.
 
-    The accelerations keep differences that the rounding of the energies hides.
+    The search evaluates energies. Their rounding may hide differences that the accelerations show.
 
     Parameters
     ----------
-    scene, speed : as of `steady_rotation`.
-    angles : (1 + blades,) rad.
+    scene, speed : see `steady_rotation`.
+    angles : (1 + blades,) rad, the result of the search.
 
     Raises
     ------
@@ -318,15 +322,15 @@ def _checked(scene: Scene, speed: float, angles: Array) -> Array:
 
 
 def _is_lower(trial: _Potential, start: _Potential, step: Array, free: slice) -> bool:
-    """Return whether a step went downhill, also where rounding hides by how much.
+    """Return whether a step went downhill, even if the decrease is smaller than rounding errors.
 
     This is the approximate Wolfe condition of W. W. Hager and H. Zhang, SIAM J. Optim. 16 (2005)
     170-192.
 
     Parameters
     ----------
-    trial, start : after and before the step.
-    step : (free,) rad.
+    trial, start : amended potential after and before the step.
+    step : (free coordinates,) rad.
     free : the coordinates that the step changes.
     """
     allowed = start.value + 1e-12 * abs(start.value)
@@ -338,16 +342,16 @@ def _is_lower(trial: _Potential, start: _Potential, step: Array, free: slice) ->
 def _amended_potential(
     form: RotorForm, angles: Array, speed: float, loads: LoadValues
 ) -> _Potential:
-    """Return V - T, slope and curvature for pitches at rest while the rotor turns without torque.
+    """Return the amended potential for pitches at rest in a rotor that turns at constant speed.
 
-    The constant torques of the pitches are in V.
+    V contains the potential of the constant pitch torques. The rotor torque is left out.
 
     Parameters
     ----------
     form : coefficients of the rotor.
-    angles : (n,) rad, of the coordinates that move.
-    speed : rad/s, of the rotor.
-    loads : at t = 0, of which the pitches' torques and rest angles count.
+    angles : (n,) rad, angles of the coordinates that move.
+    speed : rad/s, speed of the rotor.
+    loads : loads at t = 0.
     """
     rates = [speed, *(0.0 for _ in form.blades)]
 
@@ -362,24 +366,26 @@ def _amended_potential(
 
 
 def _newton_step(form: RotorForm, potential: _Potential, free: slice, *, downhill: bool) -> Array:
-    """Return a Newton step -H⁻¹ g of the free coordinates, (free,) rad, of at most 0.5 rad.
+    """Return a Newton step -H⁻¹ g of the free coordinates, (free coordinates,) rad.
 
-    Directions without stiffness, such as that of a rotor that nothing holds, are not changed.
+    No component is larger than 0.5 rad. The step has no component in directions without stiffness,
+    such as the angle of a balanced rotor.
 
     Parameters
     ----------
-    form : coefficients of the rotor, whose weights are the unit of rounding.
-    potential : its gradient g and Hessian H.
-    free : the coordinates to be changed.
-    downhill : whether absolute eigenvalues are taken, |H| for H.
+    form : coefficients of the rotor. Rounding errors are relative to its weights.
+    potential : amended potential, with gradient g and Hessian H.
+    free : the coordinates that the step changes.
+    downhill : whether the eigenvalues of H are replaced by their absolute values.
     """
     gradient, hessian = potential.slope[free], potential.curvature[free, free]
-    # Scaled to a diagonal of ±1, so that the eigenvalues of soft and stiff coordinates compare. A
-    # diagonal element that is only rounding of the weights counts as `least`.
+    # H is scaled to a diagonal of ±1, so that eigenvalues of soft and stiff coordinates can be
+    # compared. A diagonal element below `least` is only a rounding error, and is scaled by `least`.
     least = max(1e-9 * _weights(form), 1e-300)
     scale = 1.0 / np.sqrt(np.maximum(np.abs(np.diag(hessian)), least))
     values, vectors = np.linalg.eigh(hessian * scale * scale[:, None])
-    stiff = np.abs(values) > 1e-4  # else it is the rounding of weights that balance: no step
+    # A smaller eigenvalue is a rounding error of weights that balance. No step is taken there.
+    stiff = np.abs(values) > 1e-4
     divisors = np.where(stiff, np.abs(values) if downhill else values, np.inf)
     components = vectors.T @ (scale * gradient) / divisors
     step = -scale * (vectors @ components)
@@ -388,7 +394,7 @@ def _newton_step(form: RotorForm, potential: _Potential, free: slice, *, downhil
 
 
 def _weights(form: RotorForm) -> float:
-    """Return the sum of the moments of all weights about the axes, N m, as if each acted alone."""
+    """Return the sum of the magnitudes of all weights' moments about rotor and pitch axes, N m."""
     moments = [abs(float(weight)) for weight, _, _ in form.fixed]
     for blade in form.blades:
         weights = blade.lean or blade

@@ -1,4 +1,7 @@
-"""List the methods of the closed form. Importing this loads neither NumPy, SciPy nor heyoka."""
+"""List the methods of the closed form, and declare their settings.
+
+Importing this module loads neither NumPy, SciPy nor heyoka.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +14,7 @@ from rotor_mbs.methods.base import Ladder, Method, Solver, lazy, tolerance_ladde
 from rotor_mbs.methods.settings import Settings, number
 from rotor_mbs.models import Ode45Settings, equation_items
 
-if TYPE_CHECKING:  # the list of methods needs none of them
+if TYPE_CHECKING:  # these modules would load NumPy
     from rotor_mbs.scenario.scene import Scene
     from rotor_mbs.solution.trajectory import Linearization
 
@@ -21,7 +24,7 @@ _SOLVE_MANY = "rotor_mbs.models.lagrange.ensemble:solve_many"
 
 @dataclass(frozen=True)
 class TaylorSettings(Settings):
-    """heyoka's adaptive Taylor method, double precision."""
+    """Settings of heyoka's adaptive Taylor method in double precision."""
 
     tolerance: float = number(
         _EPS, above=0.0, doc="tolerance of the local error, absolute and relative"
@@ -30,14 +33,17 @@ class TaylorSettings(Settings):
 
 @dataclass(frozen=True)
 class ReferenceSettings(Settings):
-    """Two runs in quad precision."""
+    """Settings of the reference's two runs in quad precision."""
 
     tolerance: float = number(1e-33, above=0.0, doc="tolerance of the stored run")
     check_tolerance: float = number(1e-30, above=0.0, doc="tolerance of the run for comparison")
 
 
 def _relative(default: float) -> Any:
-    """Declare a relative tolerance of SciPy, which raises a smaller one to this least value."""
+    """Declare a relative tolerance of SciPy.
+
+    SciPy itself raises a smaller tolerance to the least value that is allowed here.
+    """
     return number(default, at_least=100.0 * _EPS, doc="relative tolerance of the local error")
 
 
@@ -48,7 +54,7 @@ def _absolute(default: float) -> Any:
 
 @dataclass(frozen=True)
 class Dop853Settings(Settings):
-    """SciPy's DOP853, order 8."""
+    """Settings of SciPy's DOP853, an explicit method of order 8."""
 
     relative_tolerance: float = _relative(3e-14)
     absolute_tolerance: float = _absolute(1e-16)
@@ -56,7 +62,7 @@ class Dop853Settings(Settings):
 
 @dataclass(frozen=True)
 class RadauSettings(Settings):
-    """SciPy's Radau, implicit, order 5."""
+    """Settings of SciPy's Radau, an implicit method of order 5."""
 
     relative_tolerance: float = _relative(1e-8)
     absolute_tolerance: float = _absolute(1e-11)
@@ -92,7 +98,8 @@ def _scipy_method(
     Parameters
     ----------
     solver : name of the class in `scipy.integrate`.
-    settings, ladder, relative_cost : as of `Method`; the ladder is its only one.
+    settings, relative_cost : see `Method`.
+    ladder : the only ladder of the method.
     """
 
     def build(scene: Scene, chosen: Any) -> Solver:

@@ -1,4 +1,4 @@
-"""Integrate the closed form on plain floats by SciPy's solvers or MATLAB's ode45."""
+"""Integrate the closed form in plain floats by SciPy's solvers or MATLAB's ode45."""
 
 from __future__ import annotations
 
@@ -25,18 +25,19 @@ from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.scenario.time_table import Segment
 from rotor_mbs.solution.trajectory import Array, Integration, Trajectory, sample_times
 
-# (right-hand side, start, end, state at the start, sample times inside) -> Advance
+# A function (right-hand side, start, end, state at the start, sample times inside) that returns an
+# Advance.
 Integrator = Callable[[RightHandSide, float, float, Array, Array], Advance]
 
 
 class OdeSolver:
-    """Run an integrator over a scene, with one call for each segment of the loads.
+    """Integrate a scene by calling an integrator once for each segment of the loads.
 
     Parameters
     ----------
-    scene : the run.
-    integrator : as of `scipy_integrator` or `ode45_integrator`.
-    times : (n,) s of the samples; the scene's where left out.
+    scene : the scene.
+    integrator : result of `scipy_integrator` or `ode45_integrator`.
+    times : (n,) s, sample times; by default those of the scene.
     """
 
     def __init__(self, scene: Scene, integrator: Integrator, times: Array | None = None) -> None:
@@ -58,26 +59,27 @@ class OdeSolver:
         return integration
 
     def advance(self, segment: Segment, state: Array, times: Array) -> Advance:
-        """Integrate one segment of the loads.
+        """Integrate over one segment of the loads.
 
         Parameters
         ----------
-        segment : of the loads.
-        state : (variables,) at its start.
-        times : (k,) s, the samples inside.
+        segment : the segment.
+        state : (variables,) state at the start of the segment.
+        times : (k,) s, sample times in the segment.
         """
         return self._integrator(
             self.right_hand_side(segment), segment.start, segment.end, state, times
         )
 
     def right_hand_side(self, segment: Segment) -> RightHandSide:
-        """Return the function d/dt (angles, rates[, work]) of one segment of the loads.
+        """Return the function that computes the time derivative of the state in one segment.
 
-        It computes on plain floats, which is faster than arrays for a handful of blades.
+        The state has the angles, the rates and, if it is integrated, the work in `work_unit`. The
+        function computes in plain floats, which is faster than arrays for a few blades.
 
         Parameters
         ----------
-        segment : whose loads act.
+        segment : the segment, whose loads act.
         """
         form, work_unit = self._form, self._work_unit
         count = 1 + len(form.blades)
@@ -85,7 +87,7 @@ class OdeSolver:
         constant = None if any(segment.slopes) else load_values(segment.values, pitches)
 
         def derivative(time: float, state: Sequence[float]) -> list[float]:
-            """Return the derivative of state at time (s); NaN where it is not defined."""
+            """Return the derivative of `state` at `time` (s); NaN if it is not defined."""
             values = state.tolist() if isinstance(state, np.ndarray) else state
             angles, rates = values[:count], values[count : 2 * count]
             loads = constant or load_values(segment.loads_at(time), pitches)
@@ -94,8 +96,8 @@ class OdeSolver:
                     angles, rates, form, loads, math.sin, math.cos
                 )
             except (ZeroDivisionError, ValueError, OverflowError):
-                # A singular mass matrix, or a state that has diverged: not a number, as in array
-                # arithmetic.
+                # The mass matrix is singular, or the state has diverged. The result is NaN, as it
+                # would be in the arithmetic of arrays.
                 return [math.nan] * len(values)
             if not work_unit:
                 return [*rates, *accelerations]
@@ -113,14 +115,15 @@ class OdeSolver:
 
 
 def work_unit(scene: Scene) -> float:
-    """Return how many J count as 1 in the work variable: a power of two, at least 1.
+    """Return the unit, in J, of the work as a variable of the integration.
 
-    It is the largest one below the scene's energies and torques. In J the absolute tolerance of the
-    work could be far below its own rounding.
+    The unit is the largest power of two that is not above the sum of the scene's initial kinetic
+    energy, its weights' moments and its rotor torque, but at least 1 J. If the work were in J, the
+    absolute tolerance could be far below the rounding of the work.
 
     Parameters
     ----------
-    scene : its initial energies, weights and rotor torque are added up.
+    scene : the scene.
     """
     form, columns = rotor_form(scene), scene.moving_coordinates
     angles, rates = (
@@ -137,12 +140,12 @@ def work_unit(scene: Scene) -> float:
     return 2.0 ** max(math.floor(math.log2(size)), 0) if 0.0 < size < math.inf else 1.0
 
 
-# Evaluations within one step, however often it is tried. SciPy shortens a step up to 460 times,
-# where it begins at 0, with 12 evaluations each. More are an endless loop, as where the slope
-# overflows and the first step is not a number.
+# Largest number of evaluations within one step, including all attempts. SciPy shortens a step at
+# time 0 up to 460 times, with 12 evaluations each. More evaluations are an endless loop. It occurs,
+# for example, if the derivative overflows and the size of the first step is NaN.
 MAX_STEP_EVALUATIONS = 100_000
-# After so many steps their number for the whole interval is estimated; the run ends if the estimate
-# is above the allowed number by this factor.
+# After every _OUTLOOK_STEPS steps the number of steps of the whole segment is estimated. The run
+# ends if the estimate is more than _OUTLOOK_SHARE times the allowed number.
 _OUTLOOK_STEPS = 2_000
 _OUTLOOK_SHARE = 10.0
 
@@ -155,17 +158,19 @@ def scipy_integrator(
     *,
     ends_at_samples: bool = False,
 ) -> Integrator:
-    """Return an integrator that takes the steps of one of SciPy's solvers, up to the time limit.
+    """Return an integrator that takes the steps of one of SciPy's solvers.
 
-    It fails after `max_steps`, or as soon as it is seen that it would take many more.
+    At the time limit it returns the samples computed so far. It fails after `max_steps` steps, or
+    earlier if an estimate shows that it would need many more.
 
     Parameters
     ----------
-    name : of the class in `scipy.integrate`, such as "DOP853".
-    relative_tolerance, absolute_tolerance : of the local error; the absolute one in rad, rad/s.
-    max_steps : in one segment of the loads.
-    ends_at_samples : whether a step ends at every sample, which is then as accurate as the steps;
-        else samples are read off the solver's own interpolant, which is less accurate.
+    name : name of the class in `scipy.integrate`, such as "DOP853".
+    relative_tolerance, absolute_tolerance : tolerances of the local error; the absolute one in rad
+        and rad/s.
+    max_steps : largest number of steps in one segment of the loads.
+    ends_at_samples : whether a step ends at every sample, so that samples are as accurate as the
+        steps. Otherwise samples are computed by the solver's interpolant, which is less accurate.
     """
     import scipy.integrate
 
@@ -174,17 +179,17 @@ def scipy_integrator(
     def advance(
         function: RightHandSide, start: float, end: float, state: Array, times: Array
     ) -> Advance:
-        """Integrate function from state at start (s) to end (s), with samples at times inside."""
-        in_step = 0  # evaluations
+        """Integrate `function` from `state` at `start` (s) to `end`, with samples at `times`."""
+        in_step = 0  # number of evaluations in the present step
 
         def watched(time: float, values: Sequence[float]) -> list[float]:
             nonlocal in_step
-            raise_if_over()  # here, because one step may try ever smaller sizes
+            raise_if_over()  # checked at every evaluation, because one step may try many sizes
             in_step += 1
             if in_step > MAX_STEP_EVALUATIONS:
                 raise ValueError("no step is small enough")
             slope = function(time, values)
-            # Only the derivative at the start is checked here.
+            # Only the derivative at the start is checked: the first one, before the solver exists.
             if solver is None and in_step == 1 and not all(map(math.isfinite, slope)):
                 raise ValueError("the derivative of the state is not finite")
             return slope
@@ -193,7 +198,7 @@ def scipy_integrator(
         stops = times.tolist() if ends_at_samples else []
         if not stops or stops[-1] < end:
             stops.append(end)
-        stops.reverse()  # the next one is the last
+        stops.reverse()  # `pop` returns the next stop
         with np.errstate(all="ignore"), time_limit.samples_kept_at_limit():
             try:
                 solver = solver_type(
@@ -219,7 +224,9 @@ def scipy_integrator(
                         else:
                             rows.append(solver.dense_output()(times[done:reached]).T)
                         done = reached
-                    if solver.status == "finished" and stops:  # with the step that it has found
+                    # At a sample the solver continues to the next stop. A new solver would have to
+                    # find its step size again.
+                    if solver.status == "finished" and stops:
                         solver.t_bound, solver.status = stops.pop(), "running"
                     if solver.status == "running" and _is_too_long(
                         steps, max_steps, (solver.t - start) / (end - start)
@@ -227,7 +234,7 @@ def scipy_integrator(
                         raise ValueError(f"more than {max_steps:g} steps")
             except OutOfTimeError:
                 message = time_limit.MESSAGE
-            # Its linear algebra raises these, too, on values that are not finite.
+            # SciPy's linear algebra also raises these errors, for values that are not finite.
             except (ValueError, np.linalg.LinAlgError) as exc:
                 message = f"SciPy: {exc}"
         last, evaluations = (state, 0) if solver is None else (solver.y, solver.nfev)
@@ -237,35 +244,37 @@ def scipy_integrator(
 
 
 def _is_too_long(steps: int, max_steps: float, share: float) -> bool:
-    """Return whether an interval takes too many steps, judged by the share that is crossed so far.
+    """Return whether a segment takes too many steps, or would take too many by an estimate.
 
     Parameters
     ----------
-    steps : taken so far.
-    max_steps : that are allowed.
-    share : of the interval, crossed by these steps.
+    steps : number of steps so far.
+    max_steps : number of steps allowed in the segment.
+    share : part of the segment's duration that is integrated so far.
     """
     is_seen = steps % _OUTLOOK_STEPS == 0 and steps > _OUTLOOK_SHARE * max_steps * share
     return steps >= max_steps or is_seen
 
 
 def ode45_integrator(relative_tolerance: float, absolute_tolerance: float) -> Integrator:
-    """Return an integrator by MATLAB's ode45, whose clock starts at zero on every segment.
+    """Return an integrator that takes the steps of MATLAB's ode45.
 
-    At the time limit the samples of the segment are lost.
+    Each segment is integrated from time 0 of its own. At the time limit the samples of the segment
+    are lost.
 
     Parameters
     ----------
-    relative_tolerance, absolute_tolerance : of the local error; the absolute one in rad, rad/s.
+    relative_tolerance, absolute_tolerance : tolerances of the local error; the absolute one in rad
+        and rad/s.
     """
 
     def advance(
         function: RightHandSide, start: float, end: float, state: Array, times: Array
     ) -> Advance:
-        """Integrate function from state at start (s) to end (s), with samples at times inside."""
+        """Integrate `function` from `state` at `start` (s) to `end`, with samples at `times`."""
 
         def watched(time: float, values: Sequence[float]) -> list[float]:
-            raise_if_over()  # needed in threads, which no signal interrupts
+            raise_if_over()  # needed in threads, because no signal interrupts them
             return function(start + time, values)
 
         result = matlab.ode45(

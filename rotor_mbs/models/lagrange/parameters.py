@@ -1,7 +1,8 @@
 """Compute the coefficients of the closed form from a scene.
 
-They are in exact rational arithmetic until the last step: for a point mass some vanish identically,
-and near a pitch of ±π/2 a rounding remainder would be the inertia.
+They are computed in exact rational arithmetic and rounded once, in the last step. For a point mass
+some coefficients are exactly zero. Near a pitch of ±π/2 a rounding error in their place would act
+as inertia.
 """
 
 from __future__ import annotations
@@ -19,10 +20,10 @@ from rotor_mbs.scenario.scene import Blade, Scene
 from rotor_mbs.scenario.time_table import is_constant
 from rotor_mbs.solution.trajectory import Array
 
-# A number of whatever kind the equations are to be evaluated in: float, quad precision, symbolic
+# A number of the kind in which the equations are evaluated: float, quad precision, or symbolic
 # parameter.
 Number = Any
-Convert = Callable[[Fraction], Number]
+Convert = Callable[[Fraction], Number]  # function that rounds a Fraction to a Number
 
 PI = Fraction(
     "3.14159265358979323846264338327950288419716939937510582097494459230781640628620899862803"
@@ -33,9 +34,10 @@ PI = Fraction(
 class BladeForm:
     """Hold the coefficients of one blade; s, c are sine and cosine of its pitch θ."""
 
-    cos_phase: Number  # of its mounting angle about the shaft
+    cos_phase: Number  # cosine and sine of the blade's mounting angle about the shaft
     sin_phase: Number
-    schur_ss: Number  # kg m², its share of the Schur complement, a quadratic form in (s, c)
+    # kg m², the blade's part of S is schur_ss·s² + schur_cc·c² + schur_sc·s c
+    schur_ss: Number
     schur_cc: Number
     schur_sc: Number
     # kg m², ½ ∂a/∂θ = half_slope_sc·s c + half_slope_cs·(c² - s²), a as below
@@ -47,15 +49,17 @@ class BladeForm:
     ratio_s: Number  # b / Jzz
     ratio_c: Number
     pitch_inertia: Number  # kg m², Jzz
-    weight_x: Number  # N m, m g (x, y, z) of the centre of mass
+    # N m, m g cos τ times (x, y, z cos β) of the centre of mass
+    weight_x: Number
     weight_y: Number
     weight_z: Number
-    # N m, gravity's moment on the rotor, pitch eliminated, per sine of the azimuth
+    # N m, the moment of gravity on the rotor, after the pitch is eliminated, contains sin φ times
+    # lever_ss·s² + lever_cc·c² + lever_sc·s c
     lever_ss: Number
     lever_cc: Number
     lever_sc: Number
-    stiffness: Number  # N m/rad, N m s/rad
-    damping: Number
+    stiffness: Number  # N m/rad
+    damping: Number  # N m s/rad
     inertia_ss: Number  # kg m², a = inertia_ss·s² + inertia_cc·c² + inertia_sc·s c
     inertia_cc: Number
     inertia_sc: Number
@@ -115,16 +119,16 @@ def rotor_form(
     ----------
     scene : the rotor.
     convert : rounds each coefficient once, to the kind of number to compute with.
-    phases : (blades,) cosines and sines of the mounting angles; those of `Scene.phases` where left
-        out.
+    phases : (blades,) cosines and sines of the mounting angles; by default those of equally spaced
+        blades.
     """
     if convert is float and phases is None:
         return _form_in_doubles(scene)
     return _form(scene, convert, phases)
 
 
-# Many functions that check one run need it. Only the doubles are kept: another conversion may count
-# its calls, as that to parameters of compiled code does.
+# Many functions that check a run need its coefficients in doubles. Other conversions are not
+# cached, because a conversion may have side effects: `Parameters` counts its calls.
 @functools.lru_cache(maxsize=16)
 def _form_in_doubles(scene: Scene) -> RotorForm:
     return _form(scene, float, None)
@@ -137,7 +141,7 @@ def _form(
 
     Parameters
     ----------
-    scene, convert, phases : as of `rotor_form`.
+    scene, convert, phases : see `rotor_form`.
     """
     gravity = Fraction(scene.gravity)
     count = len(scene.blades)
@@ -178,7 +182,7 @@ def leans(scene: Scene, convert: Convert = float) -> list[Lean | None]:
     Parameters
     ----------
     scene : the rotor.
-    convert : rounds each to the kind of number to compute with.
+    convert : rounds each of them to the kind of number to compute with.
 
     Returns
     -------
@@ -196,7 +200,7 @@ def leans(scene: Scene, convert: Convert = float) -> list[Lean | None]:
 
 @functools.lru_cache(maxsize=256)
 def _lean(cone: float, tilt: float) -> Lean:
-    """Return cosines and sines of two angles (rad), which are taken as exact, to 50 digits."""
+    """Return cosines and sines of cone and tilt (rad) to 50 digits; the angles count as exact."""
     return Lean(*(value for angle in (cone, tilt) for value in _cosine_and_sine(Fraction(angle))))
 
 
@@ -214,7 +218,7 @@ def _inertia_about_hub(
 
     Parameters
     ----------
-    blade : its mass (kg), centre of mass r (m) and inertia about that (kg m²).
+    blade : the blade, with its mass (kg), centre of mass r (m) and inertia about r (kg m²).
     """
     m = Fraction(blade.mass)
     x, y, z = (Fraction(value) for value in blade.centre_of_mass)
@@ -233,7 +237,8 @@ def _inertia_about_hub(
 def _rotor_inertia(blade: Blade) -> tuple[Fraction, Fraction, Fraction]:
     """Return the coefficients ss, cc, sc (kg m²) of a blade's inertia A about the shaft.
 
-    A = inertia_ss s² + inertia_cc c² + inertia_sc s c, s and c sine and cosine of the pitch.
+    A = inertia_ss s² + inertia_cc c² + inertia_sc s c, where s and c are sine and cosine of the
+    pitch. The terms of A that are linear in s and c are in `LeanForm`.
     """
     xx, yy, zz, xy, _, _ = _inertia_about_hub(blade)
     lean = _lean(blade.cone, 0.0)
@@ -242,16 +247,16 @@ def _rotor_inertia(blade: Blade) -> tuple[Fraction, Fraction, Fraction]:
     return cone_cc * xx + cone_ss * zz, cone_cc * yy + cone_ss * zz, 2 * cone_cc * xy
 
 
-# the blades of a rotor are mostly equal, and so are the rotors of a sweep
+# The blades of a rotor are often equal, and so are those of the rotors of a sweep.
 @functools.lru_cache(maxsize=256)
 def _coefficients(blade: Blade, gravity: Fraction, tilt: float) -> list[Fraction]:
     """Return the coefficients schur_ss ... lever_sc of `BladeForm`, in its order.
 
     Parameters
     ----------
-    blade : its mass, centre of mass, inertia and cone.
+    blade : the blade, with its mass, centre of mass, inertia and cone.
     gravity : m/s².
-    tilt : rad, of the shaft.
+    tilt : rad, tilt of the shaft.
     """
     xx, yy, zz, xy, xz, yz = _inertia_about_hub(blade)
     x, y, z = (Fraction(value) for value in blade.centre_of_mass)
@@ -281,7 +286,7 @@ def _lean_coefficients(blade: Blade, gravity: Fraction, tilt: float) -> list[Fra
 
     Parameters
     ----------
-    blade, gravity, tilt : as of `_coefficients`.
+    blade, gravity, tilt : see `_coefficients`.
     """
     _, _, zz, _, xz, yz = _inertia_about_hub(blade)
     x, y, z = (Fraction(value) for value in blade.centre_of_mass)
@@ -302,14 +307,15 @@ def _lean_coefficients(blade: Blade, gravity: Fraction, tilt: float) -> list[Fra
     ]
 
 
-_FIXED_POINT = 10**60  # whole numbers stand for this many times a fraction
+_FIXED_POINT = 10**60  # a fraction is represented by the whole number that is this many times it
 
 
 @functools.lru_cache(maxsize=4096)
 def _cosine_of_turn(turn: Fraction) -> Fraction:
     """Return cos(2π·turn) to 50 digits.
 
-    A third of a turn so gives exactly -1/2 in double and in quad precision.
+    With so many digits, a third of a turn gives exactly -1/2 after rounding to double or quad
+    precision.
     """
     angle = 2 * PI * ((turn + Fraction(1, 2)) % 1 - Fraction(1, 2))
     return _power_series(angle * angle, 1)
@@ -324,7 +330,7 @@ def _cosine_and_sine(angle: Fraction) -> tuple[Fraction, Fraction]:
 def _power_series(square: Fraction, first: int) -> Fraction:
     """Return Σ (-square)^n / (first (first + 1) ... (first + 2n - 1)) to 50 digits.
 
-    With first = 1 it is the cosine of the square's root, with 2 the sine divided by that root.
+    For an angle x with the given square it is cos(x) if `first` is 1, and sin(x) / x if it is 2.
 
     Parameters
     ----------
@@ -342,7 +348,7 @@ def _power_series(square: Fraction, first: int) -> Fraction:
 
 
 def changing_loads(scene: Scene) -> tuple[int, ...]:
-    """Return the places in `Scene.load_tables` of the loads that change over time."""
+    """Return the indices in `Scene.load_tables` of the loads that change over time."""
     return tuple(i for i, table in enumerate(scene.load_tables) if not is_constant(table))
 
 
@@ -352,8 +358,8 @@ def changing_rests(scene: Scene) -> tuple[bool, ...]:
     return tuple(not is_constant(rest) for rest in rests)
 
 
-# Up to this natural frequency, rad/s, a rate counts in rad/s as an angle counts in rad (the paper's
-# blades: 10.7).
+# A coordinate whose natural frequency (rad/s) is at most this has the rate unit 1 rad/s. The
+# paper's blades have 10.7 rad/s.
 _UNIT_FREQUENCY = 100.0
 
 
@@ -364,11 +370,12 @@ def pitch_weight(blade: BladeForm) -> float:
 
 
 def rate_units(scene: Scene) -> Array:
-    """Return what counts as 1 in each rate where a radian counts as 1 in an angle.
+    """Return the unit of each rate, in which a rate error counts like an angle error in rad.
 
-    It is 1 rad/s, or a coordinate's own frequency at the start (spring, gravity, turning) where
-    that is above 100 rad/s. Else the quarter period that turns an angle into a rate would count as
-    growth of an error: 1e5-fold on a bearing of 1e12 N m/rad.
+    The unit is 1 rad/s, or the natural frequency of the coordinate at the start (by spring, gravity
+    and rotation) if that is above 100 rad/s. An oscillation turns an error of an angle into an
+    error of its rate within a quarter period. In rad/s this would count as growth of the error:
+    1e5-fold on a bearing of 1e12 N m/rad.
 
     Parameters
     ----------

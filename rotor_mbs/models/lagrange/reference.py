@@ -1,7 +1,7 @@
 """Compute the reference: the closed form in quad precision, its error bound, and error growth.
 
-The bound follows from two runs of different tolerances. Also the reference at chosen times, and
-the closed form with terms left out or with blades at other azimuths.
+The bound follows from two runs with different tolerances. The module also computes the reference at
+chosen times, and defines the closed form with terms left out or with blades at other azimuths.
 """
 
 from __future__ import annotations
@@ -28,49 +28,52 @@ from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.defects import row_blocks
 from rotor_mbs.solution.trajectory import Array, Integration, Trajectory, sample_times
 
-# The uncertainty is this many times what two runs show. They differ in their truncation errors and
-# in the rounding of each step, but not in what they share: the rounded coefficients, and the
-# rounding of a motion that both integrate in the same way (a uniform rotation). Against 180 bits at
-# tolerance 1e-42 the error of the shipped scenes is at most 5.0 times the sum of difference and
-# rounding (paper/fig15-100kNm).
+# The uncertainty is this many times the sum of the difference of two runs and of rounding. The
+# difference shows truncation errors and the rounding of each step. It does not show errors that
+# both runs share: the rounded coefficients, and the rounding of a motion that both integrate in the
+# same way (a uniform rotation). Compared with runs of 180 bits and a tolerance of 1e-42, the error
+# of the shipped scenes is at most 5.0 times the sum (paper/fig15-100kNm).
 SAFETY = 10.0
 
-_QUAD_EPSILON = 2.0**-112
+_QUAD_EPSILON = 2.0**-112  # relative rounding error of quad precision
 
 
-# Where heyoka is not installed: DOP853 at the tightest that SciPy takes, 100 eps, and a hundred
-# times looser beside it, which shows how much the tolerance still decides.
+# Relative and absolute tolerances of DOP853, which replaces heyoka if that is not installed. SciPy
+# allows a relative tolerance of at least 100 eps. The second run has tolerances a hundred times
+# larger. Its difference from the first run shows the truncation error.
 _TIGHTEST = (2.3e-14, 1e-16)
 _LOOSER = (2.3e-12, 1e-14)
 _DOUBLE_EPSILON = float(np.finfo(float).eps)
-# Far above round-off, far below what bends the neighbouring trajectory away from the linear.
+# Change (rad or rad/s) of the initial state for a difference quotient: far above round-off, and so
+# small that the difference of two trajectories grows linearly.
 _PERTURBATION = 1e-9
 
 
 class ReferenceSolver:
-    """Run a scene twice, for the more accurate run, its error bound and the growth of errors.
+    """Compute the reference of a scene by two runs, with its error bound and the error growth.
 
-    The tolerance of the run that is kept, the first, is a thousandth of the other's (without heyoka
-    a hundredth): their distance is the truncation error of the other.
+    The samples are those of the first run. By default its tolerance is a thousandth of that of the
+    second run (a hundredth without heyoka). Therefore the difference of the two runs is the
+    truncation error of the second run, which is larger than that of the first.
 
     Parameters
     ----------
-    scene : the run.
-    runs : two solvers over its sample times, the more accurate one first.
-    epsilon : relative rounding error of their arithmetic.
+    scene : the scene.
+    runs : two solvers with the sample times of the scene, the more accurate one first.
+    epsilon : relative rounding error of the solvers' arithmetic.
     """
 
     def __init__(
         self, scene: Scene, runs: Sequence[Propagation | OdeSolver], epsilon: float
     ) -> None:
         self._scene, self._runs, self._epsilon = scene, runs, epsilon
-        self._difference = np.zeros(1)  # (n,) rad, of the angles of both runs
+        self._difference = np.zeros(1)  # (n,) rad, see `_angle_difference`
 
     def integrate(self) -> Integration:
-        """Integrate both runs; the report is the first's, with the failure of either."""
+        """Integrate both runs, and return the report of the first, with a failure of either run."""
         best, check = (run.integrate() for run in self._runs)
         self._difference = self._angle_difference()
-        # The states of a million samples in quad precision are 130 MB: only the first run's stay.
+        # A million states in quad precision take 130 MB. Only those of the first run are kept.
         self._runs[1].states = self._runs[1].states[:1].copy()
         failed = best if not best.success else check
         return replace(
@@ -78,7 +81,7 @@ class ReferenceSolver:
         )
 
     def _angle_difference(self) -> Array:
-        """Return the largest difference of an angle at each common sample, (n,) rad."""
+        """Return the largest difference between both runs' angles at each sample, (n,) rad."""
         best, check = (run.states for run in self._runs)
         angles = slice(len(self._scene.moving_coordinates))
         difference = np.empty(min(len(best), len(check)))
@@ -98,7 +101,8 @@ class ReferenceSolver:
         result.quantities["angle_uncertainty"] = uncertainty(
             self._difference, result.angles, self._epsilon
         )
-        # Over what was reached only: the rest of a run that its time limit ended may take too long.
+        # The growth is computed up to the last sample only. If the time limit ended the run, the
+        # rest may take too long.
         if rows > 1:
             reached = replace(self._scene, duration=float(result.time[-1]), samples=rows)
             result.quantities["error_growth"] = error_growth(reached, result.time)
@@ -108,31 +112,33 @@ class ReferenceSolver:
 
 
 def uncertainty(difference: Array, angles: Array, epsilon: float) -> Array:
-    """Return a bound on the error of angles, except for their rounding to doubles, (n,) rad.
+    """Return a bound on the error of the reference's angles at each sample, (n,) rad.
 
-    It is `SAFETY` times the sum of the difference of two runs and of the rounding of the largest
-    angle, because two runs may round alike. The largest such sum so far counts, because two runs
-    may agree by chance.
+    The bound is `SAFETY` times a sum of two terms: the difference of the two runs, and the rounding
+    of the largest angle, because both runs may round equally. At each sample the largest sum up to
+    this sample counts, because the runs may agree by chance. The bound does not include the
+    rounding of the result to doubles.
 
     Parameters
     ----------
-    difference : (n,) rad, of the two runs.
-    angles : (n, 1 + blades) rad.
-    epsilon : relative rounding error of their arithmetic.
+    difference : (n,) rad, largest difference between the angles of the two runs.
+    angles : (n, 1 + blades) rad, angles of the first run.
+    epsilon : relative rounding error of the runs' arithmetic.
     """
     largest = np.maximum(np.abs(angles).max(axis=1), 1.0)
     return np.asarray(SAFETY * np.maximum.accumulate(difference + epsilon * largest))
 
 
 def build(scene: Scene, settings: Any) -> ReferenceSolver:
-    """Build the reference solver: in quad precision with heyoka, by DOP853 without it.
+    """Return the solver of the reference.
 
-    By DOP853 the uncertainty is larger by many orders.
+    It integrates in quad precision by heyoka, or in doubles by DOP853 if heyoka is not installed.
+    With DOP853 the uncertainty is larger by many orders of magnitude.
 
     Parameters
     ----------
-    scene : the run.
-    settings : `ReferenceSettings`; their tolerances are those of the runs in quad precision.
+    scene : the scene.
+    settings : `ReferenceSettings` with the tolerances of the runs in quad precision.
     """
     if not is_available():
         runs = _in_doubles(scene, _TIGHTEST, ends_at_samples=True), _in_doubles(scene, _LOOSER)
@@ -157,22 +163,22 @@ def _in_doubles(
 
 
 def error_growth(scene: Scene, times: Array | None = None) -> Array:
-    """Return how many times a small error of the initial state may have grown, at most, (samples,).
+    """Return the largest factor by which a small error of the initial state has grown, (samples,).
 
-    It is the largest singular value of the state transition matrix (rad, `rate_units`) in the
-    coordinates that the motion can have; pitches at rest by symmetry are not among them. It is
-    infinite once past what double precision can hold.
+    It is the largest singular value of the state transition matrix for angles in rad and rates in
+    `rate_units`. Pitches that stay at rest by symmetry are left out of the matrix. The growth is
+    infinite from the first sample on at which the matrix overflows.
 
     Parameters
     ----------
-    scene : the run.
-    times : (samples,) s of the samples; the scene's where left out.
+    scene : the scene.
+    times : (samples,) s, sample times; by default those of the scene.
     """
     if not is_available():
         times = sample_times(scene) if times is None else times
         return _largest_growth(scene, _matrices_by_quotients(scene, times))
 
-    # The matrices of a million samples are half a gigabyte: only their growth is kept.
+    # The matrices of a million samples take half a gigabyte. Only the growth is kept.
     def growth_of(states: Array) -> Array:
         matrices = _matrices_in(states, scene)
         return _largest_growth(scene, matrices)[: len(matrices), None]
@@ -187,17 +193,19 @@ def error_growth(scene: Scene, times: Array | None = None) -> Array:
 
 
 def _transition_matrices(scene: Scene, times: Array) -> Array:
-    """Return the state transition matrices from the start, as far as the motion goes.
+    """Return the state transition matrices from the start to each sample.
+
+    They are computed by heyoka, or by difference quotients if heyoka is not installed.
 
     Parameters
     ----------
-    scene : the run.
-    times : (samples,) s.
+    scene : the scene.
+    times : (samples,) s, sample times.
 
     Returns
     -------
     ndarray, shape (n, 2k, 2k)
-        Of k coordinates that move, by heyoka or, without it, by difference quotients.
+        Matrices of the k coordinates that move, at the n samples that the integration reaches.
     """
     return (
         _variational_matrices(scene, times)
@@ -214,26 +222,29 @@ def _variational_matrices(scene: Scene, times: Array | None = None) -> Array:
 
 
 def _matrices_in(states: Array, scene: Scene) -> Array:
-    """Return the state transition matrices in the rows of variational states, without a copy.
+    """Return the state transition matrices in the states of a variational integration.
 
-    The first row of each matrix-shaped block is the state itself.
+    A variational state has the state itself, then the matrix row by row. The result is a view.
     """
     count = 2 * len(scene.moving_coordinates)
     return np.asarray(states.reshape(-1, 1 + count, count)[:, 1:])
 
 
 def _matrices_by_quotients(scene: Scene, times: Array) -> Array:
-    """Return the state transition matrices by difference quotients of runs from changed starts.
+    """Return the state transition matrices by difference quotients of runs.
+
+    Each of the runs has a small change in one variable of the initial state.
 
     Parameters
     ----------
-    scene : the run.
-    times : (samples,) s.
+    scene : the scene.
+    times : (samples,) s, sample times.
 
     Returns
     -------
     ndarray, shape (n, 2k, 2k)
-        Of k coordinates that move; infinite where the changed run ended before.
+        Matrices of the k coordinates that move. A column is infinite at samples that the changed
+        run did not reach.
     """
     moving = scene.moving_coordinates
 
@@ -258,11 +269,12 @@ def _matrices_by_quotients(scene: Scene, times: Array) -> Array:
 def _largest_growth(scene: Scene, matrices: Array) -> Array:
     """Return the growth of errors, (samples,), from the state transition matrices.
 
+    It is infinite at samples whose matrix is not finite, and at samples without a matrix.
+
     Parameters
     ----------
-    scene : the run.
-    matrices : (n, 2k, 2k) of the first n samples; the growth is infinite where these are not
-        finite, and at the samples after them.
+    scene : the scene.
+    matrices : (n, 2k, 2k) matrices at the first n samples.
     """
     growth = np.full(max(scene.samples, len(matrices)), np.inf)
     free = free_variables(scene)
@@ -274,7 +286,7 @@ def _largest_growth(scene: Scene, matrices: Array) -> Array:
 
 
 def free_variables(scene: Scene) -> NDArray[np.int64]:
-    """Return the indices of the state variables that are not at rest by symmetry.
+    """Return the indices of the state variables, except those of pitches at rest by symmetry.
 
     The state has the angles, then the rates, of the coordinates that move.
     """
@@ -284,12 +296,14 @@ def free_variables(scene: Scene) -> NDArray[np.int64]:
 
 
 def _in_units(scene: Scene, matrices: Array) -> Array:
-    """Return transition matrices in the units of `rate_units`."""
+    """Return state transition matrices, (n, 2k, 2k), for rates in `rate_units`."""
     units = np.concatenate([np.ones(matrices.shape[1] // 2), rate_units(scene)])
     return np.asarray(matrices * units / units[:, None])
 
 
-_QUAD_TOLERANCE = 1e-30  # its error, grown 1e10-fold, is still below what a double can hold
+# Tolerance of `reference_at`. An error of this size that grows 1e10-fold is still below the
+# rounding of doubles.
+_QUAD_TOLERANCE = 1e-30
 
 
 @dataclass(frozen=True)
@@ -298,11 +312,12 @@ class TimedReference:
 
     Attributes
     ----------
-    trajectory : time, angles, rates and error_growth, as far as the motion got.
-    growth : (n, 2 (1 + blades)) for angles, then rates: how many times larger than an error of the
-        initial state theirs may be, at most. 2-norms of the rows of the state transition matrix; 1
-        for a pitch that is fixed or at rest by symmetry.
-    units : (2 (1 + blades),) rad or rad/s, what counts as 1 in these norms.
+    trajectory : time, angles, rates and error_growth, up to the last time that the integration
+        reached.
+    growth : (n, 2 (1 + blades)) for angles, then rates, the largest factor by which the error of
+        the variable may exceed that of the initial state. The factors are the 2-norms of the rows
+        of the state transition matrix; 1 for a pitch that is fixed or at rest by symmetry.
+    units : (2 (1 + blades),) rad or rad/s, units of the variables in these norms.
     """
 
     trajectory: Trajectory
@@ -313,11 +328,12 @@ class TimedReference:
 def reference_at(scene: Scene, times: Array) -> TimedReference:
     """Compute the reference at chosen times, without interpolation.
 
-    In quad precision with heyoka, else by DOP853 at its tightest.
+    It is integrated in quad precision by heyoka, or by DOP853 at its tightest tolerance if heyoka
+    is not installed.
 
     Parameters
     ----------
-    scene : the run.
+    scene : the scene.
     times : (n,) s, increasing from 0 to the duration.
     """
     if is_available():
@@ -332,7 +348,7 @@ def reference_at(scene: Scene, times: Array) -> TimedReference:
     free = free_variables(scene)
     units, growth = np.ones(2 * count), np.ones((rows, 2 * count))
     units[[count + i for i in moving]] = rate_units(scene)
-    # Infinite where the matrices end before the motion does, or overflow.
+    # The growth is infinite where the matrices overflow, or end before the motion does.
     growth[:, columns[free]] = np.inf
     known = min(rows, len(matrices))
     with np.errstate(all="ignore"):
@@ -343,12 +359,12 @@ def reference_at(scene: Scene, times: Array) -> TimedReference:
 
 
 def with_azimuths(scene: Scene, azimuths: Sequence[float]) -> Accelerations:
-    """Return the accelerations of a rotor whose blades are at other angles about the shaft.
+    """Return the function that computes the accelerations with blades at other mounting angles.
 
     Parameters
     ----------
     scene : the rotor.
-    azimuths : (blades,) rad, in place of `Scene.phases`.
+    azimuths : (blades,) rad, mounting angles about the shaft that replace `Scene.phases`.
     """
     phases = [(Fraction(math.cos(azimuth)), Fraction(math.sin(azimuth))) for azimuth in azimuths]
     form = rotor_form(scene, phases=phases)
@@ -356,11 +372,12 @@ def with_azimuths(scene: Scene, azimuths: Sequence[float]) -> Accelerations:
 
 
 def combined_equations(*parts: tuple[float, float, float]) -> Accelerations:
-    """Return a weighted sum of the closed form's accelerations at scaled rates.
+    """Return the function that adds up the closed form's accelerations at several scaled rates.
 
     Parameters
     ----------
-    parts : of each term weight, factor of the rotor's rate, and factor of the pitches' rates.
+    parts : for each term of the sum its weight, the factor of the rotor's rate, and the factor of
+        the pitches' rates.
     """
 
     def equations(angles: Sequence[Number], rates: Sequence[Number], *rest: Any) -> list[Number]:
@@ -373,9 +390,10 @@ def combined_equations(*parts: tuple[float, float, float]) -> Accelerations:
     return equations
 
 
-# The accelerations are linear in the dampers' moments and quadratic in the rates otherwise; with
-# one kind of rate at a time, and with rates reversed, each kind of product is left out without
-# writing the equations a second time.
+# Equations without one kind of term, for data that may lack the term. The moments of dampers are
+# linear in the rates, all other terms with rates are products of two rates. Therefore sums of
+# accelerations, computed with some rates set to zero or reversed, leave out one kind of product.
+# The equations need not be written a second time.
 REDUCED_EQUATIONS: Mapping[str, Accelerations] = {
     "Coriolis terms (products of rotor rate and pitch rate)": combined_equations(
         (1.0, 1, 0), (1.0, 0, 1), (-1.0, 0, 0)

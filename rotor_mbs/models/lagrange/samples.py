@@ -1,12 +1,13 @@
 """Run any integrator from segment to segment of the loads, and compute its trajectory.
 
-Loads on roots, shaft bearing and actuators follow by Newton's and Euler's laws from the closed
-form's accelerations.
+The forces and moments in blade roots, shaft bearing and actuators follow by Newton's and Euler's
+laws from the closed form's accelerations.
 
-Symbols, in the frame of a blade with azimuth φ, pitch θ, cone β: s = sin θ, c = cos θ; angular
-velocity ω = (Ω cos β s, Ω cos β c, θ̇ + Ω sin β) and acceleration α = dω/dt; centre of mass r,
-inertia I about it; up = the base frame's z; root at e = (0, 0, hub radius). The force and the
-moment of the hub on the blade, about its root, are
+Symbols: a blade has azimuth φ, pitch θ, cone β, mass m, centre of mass r and inertia I about r;
+s = sin θ, c = cos θ. Its angular velocity is ω = (Ω cos β s, Ω cos β c, θ̇ + Ω sin β), its angular
+acceleration α = dω/dt. `up` is the z axis of the base frame, and e = (0, 0, hub radius) is the
+root. All vectors are in the blade's frame. The force and the moment of the hub on the blade, about
+its root, are
 
     F = m (α × r + ω × (ω × r) + g up),  M = I α + ω × I ω + (r - e) × F.
 """
@@ -52,9 +53,11 @@ from rotor_mbs.solution.trajectory import (
     finite_rows,
 )
 
-_DIFFERENCE = 1e-6  # rad and rad/s: far above rounding, and yet linear
+# Difference (s, rad and rad/s) of the difference quotients of loads: far above rounding, and so
+# small that loads change linearly.
+_DIFFERENCE = 1e-6
 
-# (n,) or (n, 3) numbers of one kind: doubles, or quad numbers as objects.
+# An array of shape (n,) or (n, 3), of doubles, or of quad numbers with the type object.
 Numbers = Any
 
 
@@ -63,11 +66,11 @@ class Advance(NamedTuple):
 
     Attributes
     ----------
-    states : (samples reached, variables).
-    end : (variables,) the state at the end of the segment.
+    states : (k, variables) states at the samples that the integration reached.
+    end : (variables,) state at the end of the segment, or where the integration failed.
     steps : number of steps.
-    evaluations : of the right-hand side; None where they are not counted.
-    message : why the end was not reached; "" where it was.
+    evaluations : number of evaluations of the right-hand side; None if they are not counted.
+    message : why the end of the segment was not reached; "" if it was reached.
     """
 
     states: Any
@@ -87,22 +90,23 @@ def over_segments(
 
     Parameters
     ----------
-    times : (samples,) s, the first that of the initial state.
-    segments : of the loads, in the order of time.
-    initial : (variables,) state.
-    advance : (segment, state at its start, sample times inside) -> the integration of the segment.
+    times : (samples,) s, sample times; the first is the time of the initial state.
+    segments : segments of the loads, in the order of time.
+    initial : (variables,) initial state.
+    advance : function (segment, state at its start, sample times inside) that integrates over a
+        segment and returns an Advance.
 
     Returns
     -------
     states : ndarray, shape (n, variables)
-        At the samples, cut before the first row that is not finite.
+        States at the samples before the first one that is not finite.
     integration : Integration
         The engine's report.
     """
     state, rows = initial, [initial[None, :]]
     steps, evaluations, message = 0, None, ""
     for segment in segments:
-        # A sample at which two segments meet belongs to the one before.
+        # A sample at which two segments meet belongs to the earlier segment.
         inside = times[(times > segment.start) & (times <= segment.end)]
         part = advance(segment, state, inside)
         rows.append(part.states)
@@ -125,9 +129,9 @@ def trajectory(scene: Scene, times: Array, states: Array) -> Trajectory:
     Parameters
     ----------
     scene : the rotor, its loads and the requested outputs.
-    times : (samples,) s.
-    states : (n, 2k) angles, then rates, of the k coordinates that move; with the work (J) as one
-        more column, or not.
+    times : (samples,) s, sample times; the first n belong to `states`.
+    states : (n, 2k) angles, then rates, of the k coordinates that move; or (n, 2k + 1) with the work
+        (J) in the last column, if it was integrated.
     """
     count, time = len(scene.moving_coordinates), times[: len(states)]
     angles, rates = all_coordinates(scene, states[:, :count], states[:, count : 2 * count])
@@ -158,20 +162,20 @@ def _energies(
     scene : the rotor, its loads and gravity.
     time : (n,) s.
     all_angles, all_rates : (n, 1 + blades) rad and rad/s.
-    states : as of `trajectory`, with the work as their last column or without it.
+    states : see `trajectory`.
     """
     form, columns = rotor_form(scene), scene.moving_coordinates
     angles = list(all_angles[:, columns].T)
     rates = list(all_rates[:, columns].T)
     loads = loads_at(scene, time)
-    # Rates like 1e200 overflow here; the verdict sees what is not finite.
+    # Rates of 1e200 overflow here. The judgement of the run finds numbers that are not finite.
     with np.errstate(over="ignore", invalid="ignore"):
         kinetic, potential = closed_form.energies(angles, rates, form, loads, np.sin, np.cos)
         if states.shape[1] <= 2 * len(columns):
             work = constant_work(scene, all_angles)
         else:
             work = states[:, 2 * len(columns)]
-            # What `closed_form.power` leaves out of the work of rest angles that move.
+            # Add the part of the work of changing rest angles that `closed_form.power` leaves out.
             rests = at_constant_rests(changing_rests(scene), loads).rests
             energy = closed_form.rest_energy(angles, form, rests)
             if isinstance(energy, np.ndarray):
@@ -180,27 +184,28 @@ def _energies(
 
 
 def loads_at(scene: Scene, time: Array) -> LoadValues:
-    """Return the loads at some times; at a jump, the values after it.
+    """Return the prescribed loads at the given times; at a jump, the values after it.
 
     Parameters
     ----------
-    scene : whose load tables are evaluated.
+    scene : the scene with the load tables.
     time : (n,) s.
 
     Returns
     -------
     LoadValues
-        Of the coordinates that move: a number where a load is constant, else an array (n,).
+        Loads of the coordinates that move. A constant load is a number, a changing one an array
+        (n,).
     """
     return loads_over_time(scene)(time)
 
 
 def loads_over_time(scene: Scene) -> Callable[[Array], LoadValues]:
-    """Return a function that evaluates the loads at some times, as `loads_at` does.
+    """Return the function `loads_at` of one scene, whose only parameter is the times (n,) in s.
 
     Parameters
     ----------
-    scene : whose load tables are evaluated.
+    scene : the scene with the load tables.
     """
     tables, pitches = scene.load_tables, scene.moving_coordinates[1:]
     constants = [value_at(table, 0.0) if is_constant(table) else None for table in tables]
@@ -218,12 +223,12 @@ def loads_over_time(scene: Scene) -> Callable[[Array], LoadValues]:
 
 
 def loads_at_start(scene: Scene, torque: float = 0.0) -> LoadValues:
-    """Return the loads at t = 0, with another torque on the rotor.
+    """Return the loads of the coordinates that move at t = 0, with a given rotor torque.
 
     Parameters
     ----------
-    scene : whose pitch torques and rest angles are taken.
-    torque : N m on the rotor, in place of the scene's.
+    scene : the scene with the pitch torques and rest angles.
+    torque : N m, rotor torque that replaces that of the scene.
     """
     values = [value_at(table, 0.0) for table in scene.load_tables]
     values[ROTOR_TORQUE] = torque
@@ -231,19 +236,25 @@ def loads_at_start(scene: Scene, torque: float = 0.0) -> LoadValues:
 
 
 def at_constant_rests(changing: Sequence[bool], loads: LoadValues) -> LoadValues:
-    """Return loads with the constant rest angles set to zero: they do no work.
+    """Return loads in which constant rest angles are set to zero, because they do no work.
 
     Parameters
     ----------
-    changing : (pitches that move,) as of `changing_rests`.
-    loads : of the coordinates that move.
+    changing : (pitches that move,) result of `changing_rests`.
+    loads : loads of the coordinates that move.
     """
     rests = [rest if changes else 0.0 for rest, changes in zip(loads.rests, changing, strict=True)]
     return LoadValues(loads.rotor, loads.pitches, rests)
 
 
 def constant_work(scene: Scene, angles: Array) -> Array:
-    """Return the work of constant torques τ·(q - q(0)), (n,) J, from (n, 1 + blades) rad; exact."""
+    """Return the work of constant torques, (n,) J: the sum of torque times change of the angle.
+
+    Parameters
+    ----------
+    scene : the scene with the torques and the initial angles.
+    angles : (n, 1 + blades) rad.
+    """
     work: Array = scene.torque_at(0.0) * (angles[:, 0] - scene.initial_angles[0])
     for i, torque in enumerate(scene.pitch_torque):
         work = work + value_at(torque, 0.0) * (angles[:, 1 + i] - scene.initial_angles[1 + i])
@@ -252,17 +263,18 @@ def constant_work(scene: Scene, angles: Array) -> Array:
 
 @dataclass(frozen=True)
 class LoadParts:
-    """Scale the terms that loads consist of: by 1 to keep a term, by 0 to leave it out.
+    """Hold factors of the terms in the load quantities: 1 keeps a term, 0 leaves it out.
 
     Attributes
     ----------
     weight : factor of gravity.
     accelerations : factor of the coordinates' accelerations.
-    rates : factor of the rates, on which the other inertia forces depend.
-    hub : factor of the hub's inertia, in the shaft's moment.
-    inertia : factor of the blades' inertia about their centres of mass, in roots and shaft.
-    dampers, torques : factors of the dampers and the prescribed torques in the moments of the pitch
-        actuators.
+    rates : factor of the rates in the inertia forces that depend on rates.
+    hub : factor of the hub's inertia in the moment of the shaft.
+    inertia : factor of the blades' inertia about their centres of mass, in the moments of roots and
+        shaft.
+    dampers, torques : factors of the dampers and of the prescribed torques in the moments of the
+        pitch actuators.
     """
 
     weight: float = 1.0
@@ -277,30 +289,32 @@ class LoadParts:
 def sampled_loads(
     scene: Scene, times: Array, angles: Array, rates: Array, parts: LoadParts | None = None
 ) -> dict[str, Array]:
-    """Return the load quantities at the samples of a motion.
+    """Return the load quantities (forces and moments in roots, shaft and actuators) of a motion.
 
     Parameters
     ----------
-    scene : the rotor, its loads and gravity.
+    scene : the rotor, its prescribed loads and gravity.
     times : (n,) s.
     angles, rates : (n, 1 + blades) rad and rad/s.
-    parts : the factor of each kind of term; all are 1 where left out.
+    parts : factors of the terms; by default all are 1.
 
     Returns
     -------
     dict of ndarray
-        As of `named_loads`, (n, ...) each; at a jump of a load, before it.
+        The result of `named_loads`, (n, ...) each. At a jump of a prescribed load, the quantities
+        are those before the jump.
     """
-    with np.errstate(all="ignore"):  # near a singularity; what is not finite cuts the run
+    # Near a singularity numbers may overflow. The run is cut before samples that are not finite.
+    with np.errstate(all="ignore"):
         return _loads(scene, times, angles, rates, float, np.sin, np.cos, parts)
 
 
 def load_rounding(scene: Scene, times: Array, angles: Array, rates: Array) -> dict[str, Array]:
-    """Return how much the last digits of a state leave the load quantities uncertain.
+    """Return the errors of the load quantities that the rounding of times and states may cause.
 
-    A stiff bearing's moment is a small difference of large ones. Two roundings of each number
-    count, half a unit in the last place each: its own, and that of what it is compared with, such
-    as the angle of a pitch command.
+    They can be large: the moment of a stiff bearing is a small difference of large moments. Each
+    number counts with two roundings of half a unit in the last place. The first is its own, the
+    second that of the number from which it is subtracted, such as the angle of a pitch command.
 
     Parameters
     ----------
@@ -311,14 +325,14 @@ def load_rounding(scene: Scene, times: Array, angles: Array, rates: Array) -> di
     Returns
     -------
     dict of ndarray
-        In the shape and unit of each quantity of `sampled_loads`.
+        The error of each quantity of `sampled_loads`, in its shape and unit.
     """
     loads = sampled_loads(scene, times, angles, rates)
     rounding = {name: np.zeros_like(values) for name, values in loads.items()}
     numbers, count = np.column_stack([times, angles, rates]), angles.shape[1]
     for column, values in enumerate(numbers.T):
         moved = numbers.copy()
-        # Back in time, so that a jump of a load counts from its own sample on.
+        # The change is negative: at earlier times a load has not yet jumped at a sample either.
         moved[:, column] -= _DIFFERENCE
         last_digits = np.finfo(float).eps * np.abs(values) / _DIFFERENCE
         moved_times, moved_angles, moved_rates = np.split(moved, [1, 1 + count], axis=1)
@@ -329,12 +343,13 @@ def load_rounding(scene: Scene, times: Array, angles: Array, rates: Array) -> di
 
 
 def load_conditioning(scene: Scene, times: Array, angles: Array, rates: Array) -> dict[str, Array]:
-    """Return how much accuracy of the load quantities the arithmetic of any engine may lose.
+    """Return the errors of the load quantities that the arithmetic of any engine may cause.
 
-    An engine forms the moments of inertia forces and weights from terms about some point, each
-    rounded once. The inverse of the mass matrix turns this rounding into errors of accelerations,
-    and these are errors of loads. They are far more than the last digits of the state for a blade
-    whose inertia about its pitch axis is small beside m |r|^2.
+    An engine adds up moments of inertia forces and weights about some point, and rounds each of
+    them. These rounding errors, multiplied by the inverse of the mass matrix, are errors of the
+    accelerations, which cause errors of the load quantities. If the inertia of a blade about its
+    pitch axis is small compared with m |r|^2, these errors are far larger than those of
+    `load_rounding`.
 
     Parameters
     ----------
@@ -345,7 +360,7 @@ def load_conditioning(scene: Scene, times: Array, angles: Array, rates: Array) -
     Returns
     -------
     dict of ndarray
-        In the shape and unit of each quantity of `named_loads`.
+        The error of each quantity of `named_loads`, in its shape and unit.
     """
     form, moving = rotor_form(scene), scene.moving_coordinates
     applied = load_values(
@@ -359,8 +374,8 @@ def load_conditioning(scene: Scene, times: Array, angles: Array, rates: Array) -
             np.stack([np.broadcast_to(row, times.shape) for row in accelerations], axis=1)
         )
 
-        # Size of the moments, (n, moving), of which an engine may lose a rounding; on the rotor the
-        # sum over the blades.
+        # Magnitude of the moments that an engine rounds, (n, moving coordinates). The moment on the
+        # rotor is the sum over hub and blades.
         moments = np.zeros(sizes.shape)
         moments[:, 0] = scene.hub_inertia * sizes[:, 0]
         for i, blade in enumerate(scene.blades):
@@ -375,10 +390,11 @@ def load_conditioning(scene: Scene, times: Array, angles: Array, rates: Array) -
             if column in moving:
                 moments[:, moving.index(column)] = moment
         inverse = _inverse_mass_matrices(scene, angles)
-        lost = 2.0**-53 * np.einsum("nij,nj->ni", np.abs(inverse), moments)  # of each acceleration
+        # errors of the accelerations, (n, moving coordinates)
+        lost = 2.0**-53 * np.einsum("nij,nj->ni", np.abs(inverse), moments)
 
-        # The loads of unit accelerations at rest, without gravity: loads are linear in
-        # accelerations.
+        # Load quantities are linear in the accelerations. Their derivative by an acceleration is
+        # the load quantity of a unit acceleration, at rest and without gravity.
         still, conditioning = np.zeros_like(rates), dict[str, Array]()
         for place, coordinate in enumerate(moving):
             unit = np.zeros_like(rates)
@@ -395,7 +411,7 @@ def load_conditioning(scene: Scene, times: Array, angles: Array, rates: Array) -
 
 
 def _inverse_mass_matrices(scene: Scene, angles: Array) -> Array:
-    """Return the inverse of the mass matrix by the Schur complement.
+    """Return the inverse of the mass matrix at each row of angles, by the Schur complement.
 
     Parameters
     ----------
@@ -404,13 +420,13 @@ def _inverse_mass_matrices(scene: Scene, angles: Array) -> Array:
 
     Returns
     -------
-    ndarray, shape (n, moving, moving)
-        In the coordinates that move, 1/(kg m²).
+    ndarray, shape (n, k, k)
+        1/(kg m²), inverse for the k coordinates that move.
     """
-    # The inverse of an arrowhead: v vᵀ / S + diag(0, 1/Jzz, ...), v = (-1, B/Jzz, ...).
+    # The inverse of the arrowhead is v vᵀ / S + diag(0, 1/Jzz, ...) with v = (-1, B/Jzz, ...).
     form, moving = rotor_form(scene), scene.moving_coordinates
     schur = np.full(len(angles), form.inertia)
-    levers = [np.full(len(angles), -1.0)]  # of each coordinate on the rotor: -1, then B / Jzz
+    levers = [np.full(len(angles), -1.0)]  # the components of v
     for blade, column in zip(form.blades, moving[1:], strict=True):
         s, c = np.sin(angles[:, column]), np.cos(angles[:, column])
         schur += blade.schur_ss * (s * s) + blade.schur_cc * (c * c) + blade.schur_sc * (s * c)
@@ -424,13 +440,13 @@ def _inverse_mass_matrices(scene: Scene, angles: Array) -> Array:
 
 
 def quad_loads(scene: Scene, times: Array, states: Any) -> dict[str, Array]:
-    """Return the loads, computed in quad precision and rounded to doubles at the end.
+    """Return the load quantities, computed in quad precision and then rounded to doubles.
 
     Parameters
     ----------
-    scene : the rotor, its loads and gravity.
+    scene : the rotor, its prescribed loads and gravity.
     times : (n,) s.
-    states : (n, 2k) quad numbers, angles, then rates, of the k coordinates that move.
+    states : (n, 2k) or (n, 2k + 1) quad numbers, see `trajectory`.
     """
     count = len(scene.moving_coordinates)
     states = states.astype(object)
@@ -448,15 +464,17 @@ def _loads(
     cos: Function,
     parts: LoadParts | None = None,
 ) -> dict[str, Array]:
-    """Compute the load quantities, (n, ...) each; at a jump of a load, before it.
+    """Return the load quantities, (n, ...) each, computed with numbers of any kind.
+
+    At a jump of a prescribed load, the quantities are those before the jump.
 
     Parameters
     ----------
-    scene : the rotor, its loads and gravity.
+    scene : the rotor, its prescribed loads and gravity.
     times : (n,) s.
     angles, rates : (n, 1 + blades) rad and rad/s.
-    convert, sin, cos : for the kind of number.
-    parts : the factor of each kind of term; all are 1 where left out.
+    convert, sin, cos : conversion to the kind of number, and its sine and cosine.
+    parts : factors of the terms; by default all are 1.
     """
     moving, applied = scene.moving_coordinates, values_before(scene.load_segments, times)
     accelerations = np.zeros_like(angles)
@@ -491,7 +509,13 @@ def _loads(
 
 
 def _with_inertia(scene: Scene, parts: LoadParts) -> Scene:
-    """Return a scene whose hub, and blades about their centres of mass, have other inertia."""
+    """Return a scene in which the inertia of hub and blades is multiplied by factors.
+
+    Parameters
+    ----------
+    scene : the scene.
+    parts : the factors `hub`, and `inertia` for the blades about their centres of mass.
+    """
     blades = []
     for blade in scene.blades:
         xx, yy, zz, xy, xz, yz = (parts.inertia * element for element in blade.inertia)
@@ -500,7 +524,15 @@ def _with_inertia(scene: Scene, parts: LoadParts) -> Scene:
 
 
 def _add_about_shaft(moments: Numbers, sizes: Numbers, scene: Scene, convert: Convert) -> None:
-    """Add moments about the shaft, (n,) N m, to moments in the base frame, (n, 3) N m."""
+    """Add moments about the shaft's axis to moment vectors in the base frame, in place.
+
+    Parameters
+    ----------
+    moments : (n, 3) N m, moment vectors to which the moments are added.
+    sizes : (n,) N m, moments about the shaft's axis.
+    scene : the scene with the tilt of the shaft.
+    convert : conversion to the kind of number.
+    """
     lean = leans(scene, convert)[0]
     if not lean:
         moments[:, 1] += sizes
@@ -519,21 +551,22 @@ def _reactions(
     sin: Function,
     cos: Function,
 ) -> tuple[list[tuple[Numbers, Numbers]], Numbers, Numbers]:
-    """Return force and moment at each blade root, and their sums over the blades at the apex.
+    """Return force and moment on each blade at its root, and their sums over the blades.
 
     Parameters
     ----------
     scene : the rotor.
     angles, rates, accelerations : (n, 1 + blades) rad, rad/s and rad/s².
     gravity : m/s².
-    convert, sin, cos : for the kind of number.
+    convert, sin, cos : conversion to the kind of number, and its sine and cosine.
 
     Returns
     -------
     roots : list of tuple of ndarray
-        For each blade (n, 3) force and moment about its root, in the blade's frame.
+        For each blade (n, 3) force and (n, 3) moment about its root, in the blade's frame.
     shaft_force, shaft_moment : ndarray, shape (n, 3)
-        About the apex, in the base frame; without the inertia and weight of the hub.
+        Sums over the blades of the forces, and of the moments about the apex, in the base frame.
+        Inertia and weight of the hub are not included.
     """
     sin_q, cos_q = sin(angles[:, 0]), cos(angles[:, 0])
     radius = convert(Fraction(scene.hub_radius)) if scene.hub_radius else 0.0
@@ -564,15 +597,17 @@ def root_load(
     gravity: float,
     lean: Lean | None,
 ) -> tuple[Numbers, Numbers]:
-    """Return force and moment on a blade about the apex, (n, 3) each, in the blade's frame.
+    """Return the force, and the moment about the apex, of the hub on a blade.
+
+    Both are (n, 3) in the blade's frame.
 
     Parameters
     ----------
-    blade : its mass, centre of mass and inertia.
-    azimuth, pitch : sine and cosine, (n,) each.
+    blade : the blade, with its mass, centre of mass and inertia.
+    azimuth, pitch : sine and cosine of φ and of θ, (n,) each.
     turning : Ω, θ̇, dΩ/dt and dθ̇/dt, (n,) each in rad/s and rad/s².
     gravity : m/s².
-    lean : cosines and sines of cone and tilt; None where both are 0.
+    lean : cosines and sines of cone and tilt; None if both are 0.
     """
     (sin_phi, cos_phi), (s, c) = azimuth, pitch
     spin, rate, spin_rate, rate_rate = turning
@@ -583,7 +618,8 @@ def root_load(
         )
         up = np.stack([-sin_phi * c, sin_phi * s, cos_phi], axis=1)
     else:
-        # Components along the blade's y and z axes at zero pitch, which the cone turns.
+        # `..._y` and `..._z` are components along the blade's y and z axes at zero pitch. These
+        # axes are turned by the cone.
         spin_y, spin_z = spin * lean.cos_cone, spin * lean.sin_cone
         spin_rate_y, spin_rate_z = spin_rate * lean.cos_cone, spin_rate * lean.sin_cone
         up_x, up_radial = -sin_phi * lean.cos_tilt, cos_phi * lean.cos_tilt
@@ -611,7 +647,7 @@ def _in_base_frame(
     ----------
     vectors : (n, 3) in the blade's frame.
     azimuth, pitch : sine and cosine of φ and of θ, (n,) each.
-    lean : cosines and sines of cone β and tilt τ; None where both are 0.
+    lean : cosines and sines of cone β and tilt τ; None if both are 0.
     """
     (sin_phi, cos_phi), (s, c), (x, y, z) = azimuth, pitch, vectors.T
     across, along = x * c - y * s, x * s + y * c

@@ -1,8 +1,9 @@
-"""Measure how near a rotor is to pitches at which its mass matrix is singular.
+"""Measure how near the pitches of a rotor are to angles at which its mass matrix is singular.
 
-S = J_hub + Σ cos²β (a - b²/Jzz) is the rotor's inertia with every pitch free to give way, the Schur
-complement of `closed_form`: m (c² + d²) cos²β cos²θ for point masses, which vanishes where all
-pitches are ±π/2.
+The measure is the Schur complement S = J_hub + Σ cos²β (a - b²/Jzz) of `closed_form`: the inertia
+of the rotor if no moment acts on the pitches. A point mass m at (x, 0, z) adds
+m (x² + z²) cos²β cos²θ. Therefore S vanishes if the hub is massless, all blades are such point
+masses, and all pitches are ±π/2.
 """
 
 from __future__ import annotations
@@ -17,8 +18,8 @@ from rotor_mbs.solution.trajectory import Array
 def rotor_inertia_shares(scene: Scene, angles: Array) -> Array:
     """Return S as a share of the inertia that the rotor has with fixed pitches, (n,).
 
-    The coefficients are exact until they are rounded once: for a point mass the first one vanishes,
-    and a rounding remainder in its place would count as inertia.
+    The coefficients of S are computed exactly and then rounded once. For a point mass the
+    coefficient of sin² θ vanishes; a rounding error in its place would count as inertia.
 
     Parameters
     ----------
@@ -38,10 +39,11 @@ def rotor_inertia_shares(scene: Scene, angles: Array) -> Array:
 
 
 def least_inertia_shares(scene: Scene, angles: Array) -> Array:
-    """Return the smallest share at each row and on the straight path to the next one, (n,).
+    """Return the smallest of `rotor_inertia_shares` from each row to the next one, (n,).
 
-    On the path the share is evaluated where a pitch passes ±π/2, unless a pitch moves by a right
-    angle or more.
+    The angles between two rows are taken as linear. The shares are evaluated at each row, and where
+    a pitch passes an odd multiple of π/2. The latter is left out if a pitch moves by π/2 or more
+    from row to row.
 
     Parameters
     ----------
