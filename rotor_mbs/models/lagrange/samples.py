@@ -130,8 +130,8 @@ def trajectory(scene: Scene, times: Array, states: Array) -> Trajectory:
     ----------
     scene : the rotor, its loads and the requested outputs.
     times : (samples,) s, sample times; the first n belong to `states`.
-    states : (n, 2k) angles, then rates, of the k coordinates that move; or (n, 2k + 1) with the work
-        (J) in the last column, if it was integrated.
+    states : (n, 2k) angles, then rates, of the k coordinates that move; or (n, 2k + 1) with the
+        work (J) in the last column, if it was integrated.
     """
     count, time = len(scene.moving_coordinates), times[: len(states)]
     angles, rates = all_coordinates(scene, states[:, :count], states[:, count : 2 * count])
@@ -332,7 +332,8 @@ def load_rounding(scene: Scene, times: Array, angles: Array, rates: Array) -> di
     numbers, count = np.column_stack([times, angles, rates]), angles.shape[1]
     for column, values in enumerate(numbers.T):
         moved = numbers.copy()
-        # The change is negative: at earlier times a load has not yet jumped at a sample either.
+        # The change is negative. A load that jumps at a sample has its value before the jump there,
+        # and therefore also at the changed time.
         moved[:, column] -= _DIFFERENCE
         last_digits = np.finfo(float).eps * np.abs(values) / _DIFFERENCE
         moved_times, moved_angles, moved_rates = np.split(moved, [1, 1 + count], axis=1)

@@ -32,8 +32,8 @@ from rotor_mbs.scenario.time_table import Segment
 from rotor_mbs.solution.defects import KEPT_ROWS
 from rotor_mbs.solution.trajectory import Array, Integration, Trajectory, sample_times
 
-# Unrolled code is twice as fast as compact code, but its compile time grows with the number of
-# blades.
+# Largest number of blades for which code is unrolled. Unrolled code is twice as fast as compact
+# code, but its compile time grows with the number of blades.
 _UNROLLED_BLADES = 4
 
 
@@ -44,15 +44,17 @@ def build_system(
 
     Parameters
     ----------
-    scene : the run.
-    in_momenta : whether momenta take the place of the rates.
+    scene : the scene.
+    in_momenta : whether momenta replace the rates as variables.
 
     Returns
     -------
-    equations : list of tuple (symbol, right-hand side) of angles, rates or momenta, and the work
-        (in `work_unit`) where it is integrated.
+    equations : list of tuple
+        Symbol and right-hand side for each angle, for each rate or momentum, and for the work (in
+        `work_unit`) if it is integrated.
     parameters : Parameters
-        Their last ones are offset and slope of each of `changing_loads`.
+        The parameters of the equations. The last ones are offset and slope of each changing load
+        (`changing_loads`).
 
     Raises
     ------
@@ -72,13 +74,13 @@ def symbolic_equations(
     *,
     in_momenta: bool = False,
 ) -> list[tuple[Any, Any]]:
-    """Return the equations of `build_system` from the numbers of a scene.
+    """Return the equations of `build_system`, made of given parameters.
 
     Parameters
     ----------
-    scene : the run.
-    form, loads, work_per_joule : as of `equation_numbers`.
-    in_momenta : as of `build_system`.
+    scene : the scene.
+    form, loads, work_per_joule : result of `equation_numbers`.
+    in_momenta : see `build_system`.
     """
     engine = heyoka()
     angles, others = state_symbols(form)
@@ -97,24 +99,30 @@ def symbolic_equations(
 
 
 def state_symbols(form: RotorForm) -> tuple[list[Any], list[Any]]:
-    """Return symbols of angles, and of rates or momenta: rotor, then the pitches that move."""
+    """Return symbols of the angles, and symbols of the rates or momenta, as two lists.
+
+    Each list has the symbol of the rotor, then those of the pitches that move.
+    """
     count = 1 + len(form.blades)
     symbols = heyoka().make_vars(*[f"q{i}" for i in range(count)], *[f"w{i}" for i in range(count)])
     return symbols[:count], symbols[count:]
 
 
 def equation_numbers(scene: Scene, parameters: Parameters) -> tuple[RotorForm, LoadValues, Any]:
-    """Return form, loads, and 1 / `work_unit` (0 where the work is no variable), as parameters.
+    """Return the coefficients of a scene, its loads, and 1 / `work_unit`, as heyoka's parameters.
+
+    The last one is 0 if the work is not integrated.
 
     Parameters
     ----------
-    scene : the run.
-    parameters : to which the scene's numbers are added, in the order that integrators have them.
+    scene : the scene.
+    parameters : empty parameters, to which the scene's numbers are added in the order in which the
+        compiled code has them.
     """
     form = rotor_form(scene, parameters)
     parameters.structure.append(int(scene.has_tilt_or_cone))
-    # The engine's step control is relative to the largest variable. In J the work would be the
-    # largest by far, and determine the accuracy of all others.
+    # The error tolerance of the engine's step control is relative to the largest variable. In J the
+    # work would be the largest by far, and the other variables would be less accurate.
     work_per_joule = (
         parameters.own(1 / Fraction(work_unit(scene))) if scene.work_needs_path else 0.0
     )
@@ -128,21 +136,22 @@ def equation_numbers(scene: Scene, parameters: Parameters) -> tuple[RotorForm, L
     return form, load_values(values, scene.moving_coordinates[1:]), work_per_joule
 
 
-# By key: the code as it was compiled, and copies of it whose owners no longer exist.
+# For each key the compiled code, and a list of its copies whose owners no longer exist.
 _compiled: dict[tuple[object, ...], tuple[Any, list[Any]]] = {}
 
 
 def compiled(key: tuple[object, ...], make: Callable[[], Any], owner: object) -> Any:
-    """Return compiled code that no other owner uses meanwhile, since it holds a state.
+    """Return a copy of compiled code that only `owner` uses, because the code holds a state.
 
-    It is made once per process and key. When its owner no longer exists, the next one gets it
-    as it was left: state, time and parameters are to be set.
+    The code is compiled once per process and key. After the owner no longer exists, its copy is
+    given to another owner. A copy has the state, time and parameters of its last use, and the new
+    owner must set them.
 
     Parameters
     ----------
-    key : all that the code depends on.
-    make : compiles it.
-    owner : the object after whose end the code may be used again.
+    key : everything on which the code depends.
+    make : function that compiles the code.
+    owner : the object that uses the copy.
     """
     if key not in _compiled:
         _compiled[key] = make(), []
@@ -151,8 +160,8 @@ def compiled(key: tuple[object, ...], make: Callable[[], Any], owner: object) ->
         code = idle.pop()
     except IndexError:
         code = copy.deepcopy(original)
-    # A copy takes time, too, and is kept for the next owner. The code must not refer to its owner,
-    # which would then never be removed.
+    # Copying takes time. Therefore the copy is kept for another owner when this owner is removed.
+    # The code must not refer to its owner. Otherwise the owner would never be removed.
     weakref.finalize(owner, idle.append, code).atexit = False
     return code
 
@@ -162,8 +171,9 @@ def set_parameters(integrator: Any, values: Any) -> None:
 
     Parameters
     ----------
-    integrator : heyoka's.
-    values : the scene's numbers; those after the equations' belong to energies alone.
+    integrator : integrator of heyoka.
+    values : parameters of the scene: first those of the equations, then those that only energies
+        and tips use.
     """
     integrator.pars[:] = values[: len(integrator.pars)]
 
@@ -178,10 +188,10 @@ class Propagation:
 
     Attributes
     ----------
-    integrator : heyoka's.
-    times : (n,) s of the samples.
-    states : (rows, variables) of the last run, before the first row that is not finite; where
-        variational, followed by the state transition matrix row by row.
+    integrator : integrator of heyoka.
+    times : (n,) s, sample times.
+    states : (rows, variables) states of the last run at the samples before the first one that is
+        not finite. If variational, each row also has the state transition matrix, row by row.
     """
 
     def __init__(
@@ -194,23 +204,23 @@ class Propagation:
         keep: Callable[[Array], Array] | None = None,
         **options: Any,
     ) -> None:
-        """Compile the equations, or take what is compiled for another scene of the same structure.
+        """Compile the equations, or take those compiled for another scene of the same structure.
 
         Parameters
         ----------
-        scene : the run.
-        quad : whether in quad precision; else in doubles.
+        scene : the scene.
+        quad : whether to integrate in quad precision instead of doubles.
         variational : whether to integrate the state transition matrix, too.
-        times : (n,) s of the samples; the scene's where left out.
-        keep : function of the (k, variables) states at up to `KEPT_ROWS` consecutive samples that
-            returns what is kept of them, (k, values); all is kept where left out. A long run is
-            integrated in parts of so many samples then.
-        options : of the engine.
+        times : (n,) s, sample times; by default those of the scene.
+        keep : function that reduces the states at k consecutive samples, (k, variables), to the
+            values that are kept, (k, values). It is called for at most `KEPT_ROWS` samples at a
+            time, so that a long run needs less memory. By default the states are kept.
+        options : options of heyoka's integrator.
 
         Raises
         ------
         MethodRefusal
-            Where heyoka is not installed.
+            If heyoka is not installed.
         """
         engine, self._scene = heyoka(), scene
         columns = scene.moving_coordinates
@@ -225,7 +235,7 @@ class Propagation:
         ]
         values += [0.0] * (size - count)  # the work, where it is a variable
         start = array_of([Fraction(value) for value in values], quad=quad)
-        # What the compiled code depends on.
+        # everything on which the compiled code depends
         key = (quad, variational, *options.items(), structure)
         if quad:
             options |= {"tol": engine.real128(options["tol"]), "fp_type": engine.real128}
@@ -260,11 +270,11 @@ class Propagation:
         return integration
 
     def _kept(self, states: Array) -> Array:
-        """Return what is kept of the states at some samples."""
+        """Return the values that are kept of the states (k, variables) at some samples."""
         return states if self._keep is None else self._keep(states)
 
     def set_segment(self, segment: Segment) -> None:
-        """Set the loads to those of a segment."""
+        """Set the integrator's parameters of changing loads to the values of a segment."""
         if self._changing:
             numbers = [number for i in self._changing for number in segment.linear_loads[i]]
             self.integrator.pars[-len(numbers) :] = array_of(
@@ -272,10 +282,14 @@ class Propagation:
             )
 
     def _advance(self, segment: Segment, _state: Array, times: Array) -> Advance:
-        """Integrate over a segment from where the integrator is, the end of the segment before."""
+        """Integrate over a segment, from the state that the integrator holds.
+
+        It is the state at the end of the segment before.
+        """
         integrator, kind = self.integrator, self._initial.dtype
         self.set_segment(segment)
-        # The grid ends with the segment, even without a sample there: the next one starts there.
+        # The grid must reach the end of the segment, where the next one starts, even if no sample
+        # is there.
         end = [] if len(times) and times[-1] == segment.end else [segment.end]
         grid = np.concatenate([[segment.start], times, end]).astype(kind)
         with time_limit.samples_kept_at_limit():
@@ -295,12 +309,12 @@ class Propagation:
 
 
 def _cut_segments(segments: Sequence[Segment], times: Array) -> list[Segment]:
-    """Return segments of the loads, cut after every `KEPT_ROWS` samples within them.
+    """Return the segments of the loads, divided into parts of at most `KEPT_ROWS` samples.
 
     Parameters
     ----------
-    segments : of the loads, in the order of time.
-    times : (n,) s of the samples.
+    segments : segments of the loads, in the order of time.
+    times : (n,) s, sample times.
     """
     parts = []
     for segment in segments:
@@ -312,10 +326,10 @@ def _cut_segments(segments: Sequence[Segment], times: Array) -> list[Segment]:
 
 
 def items(scene: Scene) -> list[BuiltItem]:
-    """Return the equations and terms of a scene, without loading heyoka.
+    """Return the equations, terms and outputs of a scene, without loading heyoka.
 
-    Raises MethodRefusal where it is not installed.
+    Raises MethodRefusal if heyoka is not installed.
     """
     if find_spec("heyoka") is None:
-        heyoka()  # refuses
+        heyoka()  # raises MethodRefusal
     return equation_items(scene)
