@@ -1,4 +1,4 @@
-"""Read a sweep file: a scene and what is varied, or every error of the file at once."""
+"""Read a sweep file: a scene and the keys that are varied. All errors of a file are reported."""
 
 from __future__ import annotations
 
@@ -46,20 +46,27 @@ from rotor_mbs.scenario.toml_file import (
 Array = NDArray[np.float64]
 
 SPLITS = ("train", "validation", "test")
-DRAWN = ("uniform", "normal", "sobol")
-# Values of a range; too many runs are reported where they are counted.
+DRAWN = ("uniform", "normal", "sobol")  # keys of an axis whose values are drawn
+# Largest number of values of a range, or of draws, that is read. `Design` limits the number of runs
+# further, to MAX_ROWS.
 MAX_COUNT = 10**15
-MAX_ROWS = 10_000_000
-VARIED = ("values", "linear", "log", *DRAWN)
-# Keys whose rule is an interval of its own: if the ends of an axis keep it, all values between them
-# do.
+MAX_ROWS = 10_000_000  # largest number of runs
+VARIED = ("values", "linear", "log", *DRAWN)  # keys of an axis, of which exactly one is given
+# First parts of keys whose allowed values are an interval that does not depend on other numbers. If
+# both ends of such an axis are allowed, so are all values between them.
 _INTERVALS = ("initial", "gravity", "hub", "shaft", "bearing")
-_ROWS_AT_ONCE = 4096  # that are checked: tables of all rows would take much memory
-_MAX_ROW_ERRORS = 20
+_ROWS_AT_ONCE = 4096  # number of rows checked together; all rows would take much memory
+_MAX_ROW_ERRORS = 20  # number of errors after which no more rows are checked
 
 
 def _read_key(value: object) -> str:
-    """Return the path of a key that may differ between the runs of a dataset."""
+    """Return a key, after a check that it may differ between the runs of a sweep.
+
+    Raises
+    ------
+    TableError
+        If it may not differ.
+    """
     key: str = keys.LINE.read(value)
     table = parse_key(key)[0]
     if table in ("blades", "samples", "duration"):
@@ -93,7 +100,7 @@ _SCENE_NAME = Kind(
 
 @dataclass(frozen=True)
 class Range:
-    """Values of an axis: `count` of them from `start` to `end`, both included."""
+    """A range of `count` values from `start` to `end`, both included."""
 
     start: float = file_key("start", keys.NUMBER)
     end: float = file_key("end", keys.NUMBER)
@@ -111,14 +118,18 @@ _LOG = restricted(
 
 @dataclass(frozen=True)
 class Axis:
-    """One [[axis]]: a key of the scene, and where its values come from.
+    """One [[axis]] of a sweep file: a key of the scene, and its values.
+
+    Exactly one of the attributes `values` to `sobol` is given. The others are None.
 
     Attributes
     ----------
-    key : of a number of the scene.
-    values, linear, log, uniform, normal, sobol : one of them is given, the others are None: the
-        values themselves; a range with equal differences or ratios; the ends of a uniform
-        distribution, mean and standard deviation of a normal one, the ends of a Sobol sequence.
+    key : key of a number in the scene.
+    values : the values themselves.
+    linear, log : a range with equal differences, or with equal ratios.
+    uniform : both ends of a uniform distribution.
+    normal : mean and standard deviation of a normal distribution.
+    sobol : both ends of the interval in which a Sobol sequence lies.
     """
 
     key: str = file_key("key", _KEY)
@@ -151,14 +162,18 @@ class Axis:
             raise invalid(what, f"exactly one of {', '.join(VARIED)}")
 
     def place_of(self, value: float) -> KeyPath:
-        """Return where in its table a value stands: the entry of a list, else where it is from."""
+        """Return the path of a value in the table of the axis.
+
+        For an axis with a list of values it is the path of the entry, for any other axis the path
+        of the key from which the value is computed.
+        """
         if self.values is not None:
             return ("values", self.values.index(value))
         return (next(name for name in VARIED if getattr(self, name) is not None),)
 
     @property
     def is_drawn(self) -> bool:
-        """Return whether its values are random, or those of a Sobol sequence."""
+        """Return whether the values are drawn: random numbers, or a Sobol sequence."""
         return any(getattr(self, name) is not None for name in DRAWN)
 
 
@@ -178,25 +193,29 @@ _AXES = list_of(table_of(Axis), "one or more [[axis]] tables", 1)
 
 @dataclass(frozen=True, kw_only=True)
 class Design:
-    """What a sweep file says, and the rows that follow from it: values of all axes for each run.
+    """The content of a sweep file, and its rows. A row has a value of each axis, for one run.
 
-    In a "grid" the last axis is the fastest, and all random axes together are one digit, the draw;
-    "zip" takes all axes together. Every row follows from its number alone, so that any part of a
-    sweep can be computed on any computer.
+    In a "grid" the rows are all combinations of values, ordered like the numbers of a counter whose
+    last digit changes fastest. Each axis is a digit, except that all drawn axes together are one
+    digit, the draw, at the place of the first of them. In a "zip" row i has value i of every axis.
+    A row depends only on its number, so that any part of a sweep can be computed on any computer.
 
     Attributes
     ----------
-    title, scene : of the dataset; the name of a shipped scene, or a file beside the sweep's.
-    methods, settings : names of methods, () for the default one, and settings for those that have
-        them.
-    change : numbers of the scene, by key, that differ from it in all runs.
-    samples, outputs : in place of the scene's; None for these.
-    precision : "float64" or "float32", of stored arrays.
-    error_growth, defects : whether they are computed for every run.
+    title : title of the sweep.
+    scene : name of a shipped scene, or path of a scene file relative to the sweep file.
+    methods : names of methods; () for the default method.
+    settings : settings of the methods. A method takes only the settings that it has.
+    change : numbers by key that replace those of the scene in all runs.
+    samples, outputs : replace those of the scene; None keeps those of the scene.
+    precision : type of the stored arrays, "float64" or "float32".
+    error_growth, defects : whether these are computed for every run.
     combine : "grid" or "zip".
-    draws, seed : number of random values of each random axis; seed of the random numbers.
-    validation, test : shares of the runs; in a grid with random axes of the draws, see `splits`.
-    axes : what is varied.
+    draws : number of values of each drawn axis.
+    seed : seed of the random numbers.
+    validation, test : shares of the runs for validation and test. In a grid with drawn axes they
+        are shares of the draws, see `splits`.
+    axes : the axes of the sweep.
     """
 
     title: str = file_key("title", keys.LINE)
@@ -252,7 +271,7 @@ class Design:
     axes: tuple[Axis, ...] = file_key("axis", _AXES)
 
     def __post_init__(self) -> None:
-        """Raise TableError for values that do not fit one another."""
+        """Raise TableError with all errors of values that contradict one another."""
         axes = [axis.key for axis in self.axes]
         drawn = [axis.key for axis in self.axes if axis.is_drawn]
         repeated = [key for key, count in Counter(axes).items() if count > 1]
@@ -282,7 +301,10 @@ class Design:
 
     @functools.cached_property
     def _digits(self) -> list[list[int]]:
-        """Return groups of axes that move together, as lists of axis numbers, slowest first."""
+        """Return the digits of a row number: lists of the axes that change together, slowest first.
+
+        An axis is given by its number.
+        """
         if self.combine == "zip":
             return [list(range(len(self.axes)))]
         drawn = [i for i, axis in enumerate(self.axes) if axis.is_drawn]
@@ -315,17 +337,17 @@ class Design:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Return the number of values along every digit of a grid, slowest first."""
+        """Return the number of values of each digit, slowest first."""
         counts = self.counts
         return tuple(counts[digit[0]] for digit in self._digits)
 
     def rows(self, first: int, last: int) -> Array:
-        """Return rows by their numbers.
+        """Return the rows with consecutive numbers.
 
         Parameters
         ----------
-        first, last : number of the first row, and the one after the last. After the last row of all
-            they begin again.
+        first, last : number of the first row, and number after the last row. A number of `count` or
+            more continues with row 0.
 
         Returns
         -------
@@ -341,11 +363,16 @@ class Design:
         return table
 
     def splits(self) -> NDArray[np.int8]:
-        """Return which rows are for training, validation and test: places in `SPLITS`, (rows,).
+        """Return for each row whether it is for training, validation or test.
 
-        Rows of the same draw are in the same split. Otherwise, in a grid of random and other axes,
-        nearly every draw would be in several, and a model would be tested on starts that it was
-        trained with.
+        In a grid with drawn axes, rows of the same draw are in the same split. If rows were split
+        individually, nearly every draw would be in several splits, and a machine-learning model
+        would be tested with draws with which it was trained.
+
+        Returns
+        -------
+        ndarray of int8, shape (rows,)
+            Indices in `SPLITS`.
         """
         shape, drawn = self.shape, [axis.is_drawn for axis in self.axes]
         numbers = np.arange(self.count)
@@ -361,13 +388,15 @@ class Design:
         if sobol:
             from scipy.stats import qmc  # late: 0.5 s
 
-            # One scrambled sequence over all Sobol axes: points in the unit cube. Its balance
-            # belongs to powers of two: its beginning is taken of the next one.
+            # All Sobol axes share one scrambled sequence of points in the unit cube. The sequence
+            # is balanced if its length is a power of two. Therefore the next power of two is
+            # generated, and the first points are taken.
             sampler = qmc.Sobol(len(sobol), seed=np.random.default_rng(self.seed))
             points = sampler.random_base2((self.draws - 1).bit_length())[: self.draws]
         columns = []
         for i, axis in enumerate(self.axes):
-            # One generator for each axis: an axis that is added at the end leaves the others alone.
+            # Each axis has its own generator, so that an axis that is added at the end does not
+            # change the values of the others.
             generator = np.random.default_rng([self.seed, i])
             if axis.linear:
                 columns.append(np.linspace(axis.linear.start, axis.linear.end, axis.linear.count))
@@ -389,20 +418,21 @@ DESIGN_KEYS = keys.declared_keys(Design)
 
 
 def split_rows(count: int, validation: float, test: float, seed: int) -> NDArray[np.int8]:
-    """Draw which rows, or draws, of a sweep are for training, validation and test.
+    """Choose at random which rows, or draws, of a sweep are for training, validation and test.
 
     Parameters
     ----------
-    count : their number.
-    validation, test : shares of them, to the nearest whole number.
-    seed : of the random numbers.
+    count : number of rows or draws.
+    validation, test : shares for validation and test. The numbers of rows are rounded.
+    seed : seed of the random numbers.
 
     Returns
     -------
     ndarray of int8, shape (count,)
-        Places in `SPLITS`.
+        Indices in `SPLITS`.
     """
-    # No axis has this number: the rows are drawn independently of the values.
+    # The generators of axes are seeded with the numbers of axes. No axis has the number 2**32, so
+    # that the splits are independent of the values.
     drawn = np.random.default_rng([seed, 2**32]).permutation(count)
     validation_end = round(validation * count)
     test_end = validation_end + round(test * count)
@@ -412,23 +442,25 @@ def split_rows(count: int, validation: float, test: float, seed: int) -> NDArray
     return codes
 
 
-# Field by table and name of the key.
+# Name of the scene's field for each key of the initial state. The key is a tuple (table, name).
 _START = {tuple(field.metadata["key"].split(".")): field.name for field in scene_fields("start")}
 
-# Rotors that are kept validated: more than a chunk of runs, or an axis of a usual map, has.
+# Largest number of rotors whose scenes are kept. A chunk of runs, or an axis of a usual sweep, has
+# fewer.
 MAX_ROTORS = 512
 
 
 class Variants:
-    """The scenes of a sweep.
+    """The scenes of a sweep, made from a base scene and values of the varied keys.
 
-    A scene is read for each rotor, of which most sweeps have few; then initial states are put in.
+    To read and validate a scene takes long. It is done once for each rotor, of which most sweeps
+    have few. For each row the initial state of that scene is replaced.
 
     Parameters
     ----------
-    name : of the scenes.
-    tables : of the base, as a scene file has them.
-    varied : keys at which a number is put in.
+    name : name of the scenes.
+    tables : tables of the base scene, as in a scene file.
+    varied : keys whose numbers are varied.
     """
 
     def __init__(self, name: str, tables: dict[str, Any], varied: Sequence[str]) -> None:
@@ -439,22 +471,22 @@ class Variants:
         self._rotors: dict[tuple[float, ...], Scene] = {}
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return what is pickled: the rotor, too, where all runs have the same."""
-        # The process that gets it need not read the rotor again.
+        """Return the state for pickling, with the rotor's scene only if all runs share a rotor."""
+        # With this scene, the process that receives the object need not read the rotor again.
         has_one_rotor = all(map(_is_of_start, self._paths))
         return self.__dict__ | {"_rotors": self._rotors if has_one_rotor else {}}
 
     def scene(self, values: Sequence[float]) -> Scene:
-        """Return the scene with one value for each varied key.
+        """Return the scene with given values of the varied keys.
 
         Parameters
         ----------
-        values : in the order of the keys.
+        values : a value for each key, in the order of the keys.
 
         Raises
         ------
         TableError
-            As for a file with these values.
+            If a scene file with these values has errors.
         """
         pairs = list(zip(self._paths, values, strict=True))
         rotor_numbers = tuple(value for path, value in pairs if not _is_of_start(path))
@@ -466,16 +498,16 @@ class Variants:
         start = {name: list(getattr(rotor, name)) for name in _START.values()}
         for path, value in pairs:
             if _is_of_start(path):
-                # The rotor was read with these keys: each ends in a valid index.
+                # The key ends in a valid index, because the rotor was read with it.
                 start[_START[path[:2]]][int(path[2])] = value
         changes: dict[str, Any] = {name: tuple(numbers) for name, numbers in start.items()}
         scene = dataclasses.replace(rotor, **changes)
         if _is_valid_start(scene):
             return scene
-        return self._read(values)  # which raises the error that says what is wrong
+        return self._read(values)  # raises the error of a scene file with these values
 
     def _read(self, values: Sequence[float]) -> Scene:
-        """Return the scene with some values, read as from a file."""
+        """Return the scene with given values, read and validated like a scene file."""
         tables = copy.deepcopy(self._tables)
         for path, value in zip(self._paths, values, strict=True):
             put_value(tables, path, value)
@@ -483,14 +515,14 @@ class Variants:
 
 
 def _is_of_start(path: KeyPath) -> bool:
-    """Return whether a key is one of the initial state."""
+    """Return whether a key belongs to the initial state."""
     return path[:2] in _START
 
 
 def _is_valid_start(scene: Scene) -> bool:
-    """Return whether initial angles and rates are such as a scene file may have."""
+    """Return whether a scene file may have the initial angles and rates of a scene."""
     for number in (*scene.initial_angles, *scene.initial_rates):
-        if not abs(number) <= keys.MAX_NUMBER:  # so written that NaN fails, too
+        if not abs(number) <= keys.MAX_NUMBER:  # NaN fails this comparison, too
             return False
     rates = zip(scene.initial_rates[1:], scene.blades, strict=True)
     return all(blade.has_pitch_inertia or not rate for rate, blade in rates)
@@ -498,13 +530,13 @@ def _is_valid_start(scene: Scene) -> bool:
 
 @dataclass(frozen=True)
 class Sweep:
-    """A parameter study: a scene, and what is varied.
+    """A parameter study: a scene, and the axes that are varied.
 
     Attributes
     ----------
-    design : what the file says.
-    base : the scene with the sweep's own changes, before any axis.
-    file, path : that it was read from.
+    design : content of the sweep file.
+    base : the scene with `change`, `samples` and `outputs` of the design, and no axis varied.
+    file, path : the sweep file, and its path.
     """
 
     design: Design
@@ -514,7 +546,7 @@ class Sweep:
 
     @property
     def name(self) -> str:
-        """Return the name of the file, without its ending."""
+        """Return the name of the sweep file, without its suffix."""
         return self.path.stem
 
     @property
@@ -524,18 +556,19 @@ class Sweep:
 
     @property
     def units(self) -> tuple[str, ...]:
-        """Return the unit of each axis, (axes,); "1" for none."""
+        """Return the unit of each axis, (axes,); "1" for a number without a unit."""
         return tuple(unit_of(parse_key(key)) for key in self.keys)
 
     @property
     def outputs(self) -> tuple[str, ...]:
-        """Return what is stored of each run's samples; () for metrics alone."""
+        """Return the outputs that are stored for each run; () if only metrics are stored."""
         return self.base.outputs if self.design.outputs is None else tuple(self.design.outputs)
 
     def variants(self) -> Variants:
-        """Return what makes scenes of rows.
+        """Return the object that makes the scene of a row.
 
-        They always ask for the energy: every run's balance is checked.
+        The scenes always have the output "energy", because the energy balance of every run is
+        checked.
         """
         wanted = [*self.outputs, *({"energy"} - set(self.outputs))]
         return Variants(self.name, {**scene_tables(self.base), "outputs": wanted}, self.keys)
@@ -546,13 +579,13 @@ def load_sweep(path: Path, check: ValuesCheck | None = None) -> Sweep:
 
     Parameters
     ----------
-    path : of the file; sweeps/NAME means a shipped one.
-    check : what else is wrong with the values.
+    path : path of the file, or sweeps/NAME for a shipped sweep.
+    check : function that finds more errors in the values that were read.
 
     Raises
     ------
     InputError
-        With all errors of the file.
+        If the file has errors; with all of them.
     """
     path = file_path(path)
     if not path.exists() and path.parts[:1] == ("sweeps",):
@@ -568,21 +601,22 @@ def load_sweep(path: Path, check: ValuesCheck | None = None) -> Sweep:
 
 
 def sweep_of(scene: Scene, axes: Mapping[str, object], **options: object) -> Sweep:
-    """Return a sweep made without a file.
+    """Return a sweep that is defined by Python values instead of a file.
 
     Parameters
     ----------
     scene : Scene
+        The scene that is varied.
     axes : mapping
-        By key of a number of the scene a list of values, or a table as an [[axis]] of a file has
-        it: plain values.
+        For each varied key of the scene a list of values, or a mapping with the keys of an [[axis]]
+        except `key`.
     **options
-        The other keys of a sweep file, plain values.
+        The other keys of a sweep file, with plain values.
 
     Raises
     ------
     InputError
-        Line numbers are those of the sweep's text.
+        If the sweep has errors. Their line numbers refer to the text of an equal sweep file.
     """
     text = toml_lines({"title": scene.title, "scene": scene.name, **options})
     for key, values in axes.items():
@@ -601,19 +635,19 @@ def _sweep(
 
     Parameters
     ----------
-    path, file : its path and what it holds.
-    check : what else is wrong with the values.
-    base : the scene that is varied; by default the one that the file names.
+    path, file : path and content of the file.
+    check : function that finds more errors in the values that were read.
+    base : the scene that is varied; by default the scene that the file names.
 
     Raises
     ------
     InputError
-        With all errors of the file, and of the scenes that it makes.
+        If the file has errors, or if scenes of rows have errors; with all of them.
 
     Warns
     -----
     PlausibilityWarning
-        For a key that changes nothing that is stored.
+        If an axis varies a key that has no effect on the stored outputs.
     """
     with file.with_line_numbers():
         design = Design(**keys.read_keys(DESIGN_KEYS, file.tables, check))
@@ -628,14 +662,15 @@ def _sweep(
     if design.outputs:
         changes["outputs"] = design.outputs
     if changes:
-        # All changes are made at once: an error is reported at the first of these keys.
+        # All changes are made together. Therefore an error is reported at the first of the keys
+        # that are given.
         given = [key for key in ("change", "samples", "outputs") if getattr(design, key)]
         with file.with_line_numbers(given[0]):
             base = base.replace(**changes)
     sweep = Sweep(design, base, file, path)
-    # A problem of many rows is reported once; a dict keeps the order.
+    # A dict serves as an ordered set, so that a problem of many rows is reported once.
     faults: dict[KeyProblem, None] = {}
-    found: set[KeyProblem] = set()  # in scenes with one axis alone
+    found: set[KeyProblem] = set()  # problems found so far, without the place in the sweep file
     for i, variants, row in _rows_to_check(sweep):
         try:
             variants.scene(row)
@@ -644,7 +679,8 @@ def _sweep(
             values = ", ".join(f"{key} = {value:g}" for key, value in pairs)
             is_alone = len(row) == 1
             for fault in error.faults:
-                # What one axis alone does is no fault of another that varies beside it.
+                # A row with values of all axes may repeat a problem that was found with one axis
+                # alone. It is not reported again for another axis.
                 if not is_alone and fault in found:
                     continue
                 found.add(fault)
@@ -665,10 +701,11 @@ def _sweep(
 
 
 def _rows_to_check(sweep: Sweep) -> Iterator[tuple[int, Variants, tuple[float, ...]]]:
-    """Yield rows of a sweep which show, if they can be read, that all rows can.
+    """Yield rows such that all rows of a sweep are valid if these rows are.
 
-    These are the ends of each axis, and all rows in which numbers depend on one another. Only
-    inertias and torque tables do.
+    The first rows have one value: the smallest or largest value of one axis. Then follow complete
+    rows, if the sweep has axes whose allowed values depend on other numbers, such as inertias or
+    torque tables. Of complete rows with equal values on these axes only the first is yielded.
 
     Parameters
     ----------
@@ -677,7 +714,8 @@ def _rows_to_check(sweep: Sweep) -> Iterator[tuple[int, Variants, tuple[float, .
     Yields
     ------
     axis, variants, row
-        Number of the axis that is named if the row is wrong; what makes a scene of it; its values.
+        Number of the axis that an error names, object that makes the scene of the row, and values
+        of the row.
     """
     tables = {**scene_tables(sweep.base), "outputs": list(sweep.outputs) or ["angles"]}
     for i, axis in enumerate(sweep.design.axes):
@@ -690,16 +728,17 @@ def _rows_to_check(sweep: Sweep) -> Iterator[tuple[int, Variants, tuple[float, .
         together = sweep.variants()
         for first in range(0, sweep.design.count, _ROWS_AT_ONCE):
             rows = sweep.design.rows(first, min(first + _ROWS_AT_ONCE, sweep.design.count))
-            # Rows with equal values on the dependent axes are right or wrong together.
+            # Rows with equal values on the dependent axes are either all valid or all invalid.
             _, distinct = np.unique(rows[:, dependent], axis=0, return_index=True)
             for row in rows[np.sort(distinct)]:
                 yield dependent[0], together, tuple(row.tolist())
 
 
 def _is_interval(key: str) -> bool:
-    """Return whether the allowed values of a key are an interval, whatever other numbers are."""
+    """Return whether the allowed values of a key are an interval, independent of other numbers."""
     path = parse_key(key)
     if path[0] == "torque" or path[:2] == ("bearing", "rest"):
-        is_of_row = any(isinstance(part, int) for part in path[3:])  # of a table over time
+        # A second index, of a row in a table over time, makes the number depend on other rows.
+        is_of_row = any(isinstance(part, int) for part in path[3:])
         return not is_of_row
     return path[0] in _INTERVALS or path[-1] == "mass" or "tip" in path
