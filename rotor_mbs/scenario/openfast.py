@@ -1,7 +1,8 @@
-"""Read the rotor of an OpenFAST model: geometry, masses, start, and what a scene cannot hold.
+"""Read the rotor of an OpenFAST model: geometry, masses, initial state, and what no scene can have.
 
-Blades have the masses that OpenFAST computes with: ElastoDyn's sum over its nodes, or the integral
-over BeamDyn's stations. OpenFAST's axes x (downwind), y, z are the scene's y, -x, z.
+The masses of the blades are those with which OpenFAST computes: ElastoDyn's sum over its nodes, or
+the integral over BeamDyn's stations. OpenFAST's axes x (downwind), y, z are the scene's axes y, -x,
+z.
 """
 
 from __future__ import annotations
@@ -20,32 +21,33 @@ from rotor_mbs.scenario import keys
 from rotor_mbs.scenario.openfast_files import MAX_ROWS, InputFile, table_columns
 from rotor_mbs.scenario.toml_file import shown_path
 
-MAX_NODES = 10_000
+MAX_NODES = 10_000  # largest number of nodes of a blade
 _ANGLE = keys.within(keys.NUMBER, at_least=-360.0, at_most=360.0)
 _TILT = keys.within(keys.NUMBER, at_least=-90.0, at_most=90.0)
 _CONE = keys.within(keys.NUMBER, at_least=-85.0, at_most=85.0)
-_TABLE = "DISTRIBUTED"  # in the header of BeamDyn's stations
-# Of a matrix of BeamDyn: its six rows, for stiffness, then for mass.
+_TABLE = "DISTRIBUTED"  # word in the header of BeamDyn's stations
+# Number of rows of each matrix of BeamDyn. A station has a stiffness matrix, then a mass matrix.
 _MATRIX_ROWS = 6
-# A larger difference of the node sum from the integral is reported to the user.
+# Relative difference of node sum and integral above which the difference is reported to the user.
 _SHOWN_DIFFERENCE = 1e-3
 
 
 @dataclass(frozen=True)
 class BladeModel:
-    """Mass properties of a blade, about its root or its centre of mass, in the scene's axes.
+    """Mass properties and start of a blade of an OpenFAST model, in the scene's axes.
 
     Attributes
     ----------
-    source : what they were computed from, in words.
+    source : text that says from what the mass properties were computed.
     mass : kg.
-    first_moment, second_moment : of the mass along the blade, about the root, kg m and kg m².
+    first_moment, second_moment : ∫ z dm and ∫ z² dm, where z is the distance from the root along
+        the blade, kg m and kg m².
     centre_of_mass : (3,) m, from the root.
-    inertia : xx yy zz xy xz yz about the centre of mass, kg m².
-    tip : (3,) m, from the root.
-    cone : degrees, the tip towards +y.
-    pitch : degrees, at the start, OpenFAST's sign: positive towards feather.
-    notes : what else is worth a comment.
+    inertia : elements xx yy zz xy xz yz of the inertia about the centre of mass, kg m².
+    tip : (3,) m, position of the tip from the root.
+    cone : degrees, positive if the blade leans towards +y.
+    pitch : degrees, initial pitch with OpenFAST's sign: positive towards feather.
+    notes : further texts for comments in the scene file.
     """
 
     source: str
@@ -61,7 +63,7 @@ class BladeModel:
 
     @property
     def body(self) -> tuple[object, ...]:
-        """Return what defines the blade as a body, without its pitch: equal for equal blades."""
+        """Return the properties in which equal blades agree: those of the body, not the pitch."""
         return self.mass, self.centre_of_mass, self.inertia, self.tip, self.cone
 
 
@@ -71,20 +73,23 @@ class OpenFastRotor:
 
     Attributes
     ----------
-    path, description : of the .fst file.
+    path, description : path of the .fst file, and the description in it.
     blades : (blades,) `BladeModel`.
-    hub_radius, hub_mass, hub_centre_of_mass : m, kg, m downwind of the apex.
-    hub_inertia : kg m² about the shaft, as a sum: the hub's, then the generator's.
-    hub_inertia_text : the same sum as arithmetic of the model's numbers.
+    hub_radius : m, distance of the blade roots from the apex.
+    hub_mass : kg.
+    hub_centre_of_mass : m, distance of the hub's centre of mass downwind of the apex.
+    hub_inertia : kg m², two inertias about the shaft: that of the hub, and that of the generator.
+    hub_inertia_text : sum of the two inertias, as arithmetic with the numbers of the model.
     tilt : degrees.
     gravity : m/s².
-    azimuth, azimuth_up : degrees; initial one of blade 1, and that at which blade 1 points up.
-    speed : rpm, at the start.
-    undersling : m, from the teeter pin to the apex; 0 for three blades.
-    bearing : stiffness, damping, neutral pitch in degrees of each pitch bearing; () where the pitch
-        is prescribed.
-    duration : s, of the model's run.
-    left_out : what the model has and a scene has not, the most important first.
+    azimuth : degrees, initial azimuth of blade 1.
+    azimuth_up : degrees, azimuth of blade 1 at which the blade points up.
+    speed : rpm, initial speed of the rotor.
+    undersling : m, distance from the teeter pin to the apex; 0 unless the rotor has two blades.
+    bearing : stiffness (N m/rad), damping (N m s/rad) and neutral pitch (degrees) of each pitch
+        bearing; () if the pitch is prescribed.
+    duration : s, duration of the model's run.
+    left_out : texts about what the model has and no scene has, the most important first.
     """
 
     path: Path
@@ -107,14 +112,15 @@ class OpenFastRotor:
 
     @property
     def has_equal_blades(self) -> bool:
-        """Return whether all blades are equal bodies, whatever their pitches are."""
+        """Return whether all blades have equal bodies; their initial pitches may differ."""
         return len({blade.body for blade in self.blades}) == 1
 
     @property
     def inertia(self) -> float:
         """Return the rotor's inertia about the shaft, kg m², as OpenFAST's summary prints it.
 
-        Blades are lines of mass on their pitch axes there; the generator is not in it.
+        The summary treats each blade as a line of mass on its pitch axis. The inertia of the
+        generator is not included.
         """
         total = self.hub_inertia[0]
         for blade in self.blades:
@@ -129,13 +135,13 @@ def read_rotor(path: Path) -> OpenFastRotor:
 
     Parameters
     ----------
-    path : of the .fst file. Of the files that it names only those are read that the rotor needs.
+    path : path of the .fst file. Only those files that it names are read which the rotor needs.
 
     Raises
     ------
     InputError
-        For a file or line that is missing, a number that is not allowed, and a model of which no
-        scene can be made.
+        If a file or line is missing, a number is not allowed, or no scene can be made from the
+        model.
     """
     main = InputFile(path, what="the main input file (.fst) of an OpenFAST model")
     if "CompElast" not in main and "NumBl" in main:
@@ -185,7 +191,7 @@ def read_rotor(path: Path) -> OpenFastRotor:
 
 
 def plain_number(number: float) -> str:
-    """Return a number for arithmetic in a scene file, without a superfluous ".0"."""
+    """Return the text of a number for arithmetic in a scene file, without a final ".0"."""
     return repr(number).removesuffix(".0")
 
 
@@ -203,7 +209,7 @@ def _hub_inertia(structure: InputFile, count: int) -> tuple[float, str]:
     Returns
     -------
     float, str
-        In kg m².
+        Inertia in kg m², and its text.
 
     Raises
     ------
@@ -213,8 +219,9 @@ def _hub_inertia(structure: InputFile, count: int) -> tuple[float, str]:
     inertia = structure.number("HubIner", keys.NOT_NEGATIVE)
     if count != 2 or "HubIner_Teeter" in structure:
         return inertia, plain_number(inertia)
-    # Before OpenFAST 4.2 it is that about the teeter axis of a two-bladed rotor. The program takes
-    # it for that about the shaft, too, after moving it to the hub's centre of mass.
+    # In files before OpenFAST 4.2, HubIner of a two-bladed rotor is the inertia about the teeter
+    # axis. OpenFAST converts it to the hub's centre of mass, and uses the result as the inertia
+    # about the shaft, too.
     mass = structure.number("HubMass", keys.NOT_NEGATIVE)
     undersling = structure.number("UndSling", keys.SIZE)
     centre = structure.number("HubCM", keys.SIZE)
@@ -238,22 +245,22 @@ def _bearing(
 ) -> tuple[tuple[float, float, float], ...]:
     """Return stiffness, damping and neutral pitch (degrees) of each pitch bearing.
 
-    OpenFAST has them in ServoDyn since version 5.
+    Since version 5 OpenFAST reads these from the file of ServoDyn.
 
     Parameters
     ----------
     main, structure : the .fst file and ElastoDyn's primary file.
-    blades : of the rotor.
+    blades : blades of the rotor.
 
     Returns
     -------
     tuple of (float, float, float)
-        In N m/rad, N m s/rad and degrees; () for a prescribed pitch.
+        Values in N m/rad, N m s/rad and degrees for each bearing; () if the pitch is prescribed.
 
     Raises
     ------
     InputError
-        For a pitch that is free and has no inertia.
+        If the pitch is free and a blade has no inertia about its pitch axis.
     """
     if not structure.flag("PitchDOF"):
         return ()
@@ -277,12 +284,12 @@ def _bearing(
 
 
 def _elastodyn_blade(main: InputFile, structure: InputFile, number: int) -> BladeModel:
-    """Return a blade as ElastoDyn sums it up over its nodes.
+    """Return a blade whose mass properties are ElastoDyn's sums over the blade's nodes.
 
     Parameters
     ----------
     main, structure : the .fst file and ElastoDyn's primary file.
-    number : of the blade, from 1.
+    number : number of the blade, from 1.
 
     Raises
     ------
@@ -307,13 +314,14 @@ def _elastodyn_blade(main: InputFile, structure: InputFile, number: int) -> Blad
     if not mass >= keys.SMALLEST:
         raise file.problem("BMassDen", f"the blade's mass is {mass:g} kg", "a mass above 0")
 
-    # Only a free pitch has an inertia: where it is prescribed, OpenFAST uses none.
+    # OpenFAST uses the inertia about the pitch axis only if the pitch is free.
     pitch_inertia = 0.0
     if structure.flag("PitchDOF"):
         for name in ("PBrIner", "BlPIner"):
             pitch_inertia += structure.number(f"{name}({number})", keys.NOT_NEGATIVE, 0.0)
     across = second - first**2 / mass
-    if across < 0.0:  # by rounding, of a single node
+    # With a single node it is 0, and rounding may make it negative.
+    if across < 0.0:
         across = 0.0
     return BladeModel(
         source=f"ElastoDyn's sum over {which}",
@@ -330,9 +338,9 @@ def _elastodyn_blade(main: InputFile, structure: InputFile, number: int) -> Blad
 
 
 def _blade_table(file: InputFile) -> tuple[list[float], list[float]]:
-    """Return fractions of the length and masses per length (kg/m) of a blade file's stations.
+    """Return fractions of the length and masses per length (kg/m) at the stations of a blade.
 
-    Columns differ between versions of the file, and are found by their names.
+    The columns of the table differ between versions of the file. They are found by their names.
 
     Parameters
     ----------
@@ -364,7 +372,14 @@ def _blade_table(file: InputFile) -> tuple[list[float], list[float]]:
 
 
 def _mass_density(file: InputFile) -> Callable[[float], float]:
-    """Return a function of the fraction of the length: mass per length, kg/m, linear between."""
+    """Return the function that computes the mass per length, kg/m, at a fraction of the length.
+
+    The function is linear between the stations.
+
+    Parameters
+    ----------
+    file : ElastoDyn's file of the blade.
+    """
     fractions, densities = _blade_table(file)
 
     def density(fraction: float) -> float:
@@ -388,16 +403,16 @@ def _nodes(
 
     Parameters
     ----------
-    main, structure, blade : the .fst file, ElastoDyn's primary file, a blade file.
-    length : of the blade, m.
+    main, structure, blade : the .fst file, ElastoDyn's primary file, and the blade's file.
+    length : m, length of the blade.
 
     Raises
     ------
     InputError
         If the model has AeroDyn 14, and its file has no table of nodes.
     """
-    # 1 is AeroDyn 14, with whose nodes ElastoDyn computes; or since OpenFAST 4, whose blade files
-    # have no column PitchAxis, AeroDisk.
+    # In older models a CompAero of 1 means AeroDyn 14, and ElastoDyn uses the nodes of AeroDyn 14.
+    # Since OpenFAST 4 it means AeroDisk. Blade files of these versions have no column PitchAxis.
     is_old = blade.line_with("BlFract", "PitchAxis") >= 0
     if is_old and main.whole("CompAero", 0, 100, 0) == 1:
         aero = main.file("AeroFile", "an input file of AeroDyn 14")
@@ -419,7 +434,7 @@ def _aerodyn14_nodes(
     Parameters
     ----------
     structure, aero : the input files of ElastoDyn and AeroDyn 14.
-    length : of the blade, m.
+    length : m, length of the blade.
 
     Raises
     ------
@@ -452,14 +467,19 @@ def _integral_note(
     mass: float,
     second: float,
 ) -> tuple[str, ...]:
-    """Return how far the integral of the piecewise linear density is from the node sum.
+    """Return a note on the difference between the integral of the density and the node sum.
 
     Parameters
     ----------
-    file : of the blade.
-    length : of the blade, m.
+    file : ElastoDyn's file of the blade.
+    length : m, length of the blade.
     tip_mass : kg.
-    mass, second : mass and second moment of the node sum, kg and kg m².
+    mass, second : mass and second moment by the node sum, kg and kg m².
+
+    Returns
+    -------
+    tuple of str
+        The note; () if the relative differences are at most `_SHOWN_DIFFERENCE`.
     """
     fractions, densities = _blade_table(file)
     total, moment = tip_mass, tip_mass * length**2
@@ -468,7 +488,7 @@ def _integral_note(
         mean = 0.5 * (densities[left] + densities[left + 1])
         at_middle = 0.25 * (a + b) ** 2 * mean
         total += (b - a) * mean
-        # Simpson's rule is exact for the product of a linear density and a square.
+        # Simpson's rule is exact for the product of a linear density and a squared distance.
         ends = a**2 * densities[left] + b**2 * densities[left + 1]
         moment += (b - a) * (ends + 4.0 * at_middle) / 6.0
     by_mass, by_moment = total / mass - 1.0, moment / second - 1.0 if second else 0.0
@@ -482,12 +502,14 @@ def _integral_note(
 
 
 def _beamdyn_blade(main: InputFile, structure: InputFile, number: int) -> BladeModel:
-    """Return a blade as the integral over BeamDyn's stations, with the inertia of its sections.
+    """Return a blade whose mass properties are integrals over BeamDyn's stations.
+
+    The inertia of the blade's sections is included.
 
     Parameters
     ----------
     main, structure : the .fst file and ElastoDyn's primary file.
-    number : of the blade, from 1.
+    number : number of the blade, from 1.
 
     Raises
     ------
@@ -503,7 +525,7 @@ def _beamdyn_blade(main: InputFile, structure: InputFile, number: int) -> BladeM
         raise sections.problem("station_total", "the blade has no mass", "a mass above 0")
 
     centre = moment / mass
-    # The scene's x is OpenFAST's -y, its y OpenFAST's x (downwind).
+    # The scene's x axis is OpenFAST's -y, and the scene's y axis is OpenFAST's x (downwind).
     to_scene = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     about_centre = to_scene @ (about_root - mass * _steiner(centre)) @ to_scene.T
     if structure.flag("PitchDOF"):
@@ -516,7 +538,7 @@ def _beamdyn_blade(main: InputFile, structure: InputFile, number: int) -> BladeM
         source=f"integral over BeamDyn's {len(fractions)} stations",
         mass=mass,
         first_moment=float(moment[2]),
-        # The integral of z² over the mass, by the moments of inertia about the root.
+        # ∫ z² dm follows from the moments of inertia about the root.
         second_moment=float(0.5 * (about_root[0, 0] + about_root[1, 1] - about_root[2, 2])),
         centre_of_mass=(x, y, z),
         inertia=(xx, yy, zz, xy, xz, yz),
@@ -536,20 +558,21 @@ def _mass_properties(
 
     Parameters
     ----------
-    axis, twist : (k, 3) m and (k,) degrees at the key points, linear between.
+    axis, twist : (k, 3) m and (k,) degrees, reference axis and twist at the key points. Between
+        these both are linear.
     fractions, matrices : (n,) and (n, 6, 6), see `_stations`.
 
     Returns
     -------
     float, ndarray, ndarray
-        Mass, kg; first moment about the root, (3,) kg m; inertia about it, (3, 3) kg m².
+        Mass, kg; first moment about the root, (3,) kg m; inertia about the root, (3, 3) kg m².
     """
     mass, moment, about_root = 0.0, np.zeros(3), np.zeros((3, 3))
     pieces = np.diff(axis, axis=0)
     lengths = np.sqrt((pieces**2).sum(axis=1))
     at_key_points = np.concatenate([[0.0], np.cumsum(lengths)]) / lengths.sum()
-    # Between two of these points mass and axis are linear; three points of Gauss's rule are exact
-    # for their product with the square of a distance.
+    # Between two of these bounds the mass per length and the axis are linear. Gauss's rule with
+    # three points is exact for the product of the mass per length and a squared distance.
     bounds = np.unique(np.concatenate([at_key_points, fractions]))
     bounds = bounds[(bounds >= fractions[0]) & (bounds <= fractions[-1])]
     points, weights = np.polynomial.legendre.leggauss(3)
@@ -565,7 +588,8 @@ def _mass_properties(
             angle = twist[piece] + share * (twist[piece + 1] - twist[piece])
             turned = _section_axes(tangent, math.radians(angle))
             per_length, offset, inertia = _section(matrices, fractions, eta)
-            # The tensor is about the section's origin: to its centre of mass, and to the root.
+            # `inertia` is about the section's origin. It is converted to the section's centre of
+            # mass (`own`), then to the root.
             centre = position + turned @ offset
             own = turned @ (inertia - per_length * _steiner(offset)) @ turned.T
             mass += per_length * ds
@@ -575,13 +599,20 @@ def _mass_properties(
 
 
 def _steiner(point: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the inertia of a unit mass at a point about the origin, (3, 3) m²."""
+    """Return the inertia, divided by the mass, of a point mass about the origin, (3, 3) m².
+
+    Parameters
+    ----------
+    point : (3,) m, position of the point mass.
+    """
     squared: NDArray[np.float64] = point @ point * np.eye(3) - np.outer(point, point)
     return squared
 
 
 def _reference_axis(file: InputFile) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return key points, (n, 3) m from the root in OpenFAST's axes, and twists, (n,) degrees.
+    """Return the key points of the reference axis, (k, 3) m, and the twists there, (k,) degrees.
+
+    The key points are positions from the root in OpenFAST's axes.
 
     Parameters
     ----------
@@ -599,7 +630,7 @@ def _reference_axis(file: InputFile) -> tuple[NDArray[np.float64], NDArray[np.fl
         raise InputError(f"{shown_path(file.path)}: {what}; allowed: an input file of BeamDyn")
     rows = file.rows(header + 2, count, "key point", 4)
     table = np.array([row[:4] for row in rows])
-    # The last point of a member is the first of the next one.
+    # The last key point of a member is repeated as the first of the next member.
     is_new = np.concatenate([[True], (np.diff(table[:, :3], axis=0) != 0.0).any(axis=1)])
     points, twists = table[is_new, :3], table[is_new, 3]
     if not (np.diff(points, axis=0) ** 2).sum() > 0.0:
@@ -608,11 +639,11 @@ def _reference_axis(file: InputFile) -> tuple[NDArray[np.float64], NDArray[np.fl
 
 
 def _stations(file: InputFile) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the stations of a blade of BeamDyn.
+    """Return positions and mass matrices of the stations of a blade of BeamDyn.
 
     Parameters
     ----------
-    file : the blade file.
+    file : BeamDyn's file of the blade.
 
     Returns
     -------
@@ -627,7 +658,8 @@ def _stations(file: InputFile) -> tuple[NDArray[np.float64], NDArray[np.float64]
         If the table is missing or incomplete, fractions do not rise, or a mass is negative.
     """
     count = file.whole("station_total", 2, MAX_ROWS)
-    # Blocks of damping stand before the stations, and have rows of numbers, too.
+    # The file may have damping blocks before the stations. These have rows of numbers, too, which
+    # must be skipped.
     start = next((i for i, line in enumerate(file.lines) if _TABLE in line.upper()), -1)
     if start < 0:
         what = "no line with DISTRIBUTED PROPERTIES"
@@ -658,13 +690,19 @@ def _section(
     fractions: NDArray[np.float64],
     eta: float,
 ) -> tuple[float, NDArray[np.float64], NDArray[np.float64]]:
-    """Return mass per length, centre of mass (3,) m and inertia (3, 3) about the section's origin.
+    """Return the mass properties of a section of a blade.
 
     Parameters
     ----------
-    matrices : (n, 6, 6), of mass at the stations, linear between.
-    fractions : (n,) of the stations.
+    matrices : (n, 6, 6) mass matrices at the stations. Between the stations they are linear.
+    fractions : (n,) fractions of the length at which the stations are.
     eta : fraction of the length at which the section is.
+
+    Returns
+    -------
+    float, ndarray, ndarray
+        Mass per length, kg/m; centre of mass, (3,) m; inertia per length about the section's
+        origin, (3, 3) kg m.
     """
     right = min(max(int(np.searchsorted(fractions, eta)), 1), len(fractions) - 1)
     share = (eta - fractions[right - 1]) / (fractions[right] - fractions[right - 1])
@@ -680,8 +718,8 @@ def _section_axes(tangent: NDArray[np.float64], twist: float) -> NDArray[np.floa
 
     Parameters
     ----------
-    tangent : (3,) of the reference axis: the section's z.
-    twist : rad, about -z: the section's x, seen along the blade, is at this angle.
+    tangent : (3,) unit tangent of the reference axis, which is the section's z axis.
+    twist : rad, angle of the section's x axis, counted about -z.
     """
     x = np.array([math.cos(twist), -math.sin(twist), 0.0])
     x -= (x @ tangent) * tangent
@@ -689,11 +727,11 @@ def _section_axes(tangent: NDArray[np.float64], twist: float) -> NDArray[np.floa
     return np.column_stack([x, np.cross(tangent, x), tangent])
 
 
-# What a scene has no place for
+# Properties of the model that no scene has
 
 
 def _left_out(main: InputFile, structure: InputFile, elastic: int, count: int) -> list[str]:
-    """Return what the model has and a scene has not, a text each, the most important first.
+    """Return texts about what the model has and no scene has, the most important first.
 
     Parameters
     ----------
@@ -755,5 +793,5 @@ def _left_out(main: InputFile, structure: InputFile, elastic: int, count: int) -
 
 
 def _listed(structure: InputFile, names: Sequence[str]) -> str:
-    """Return those of some flags that are True, joined by commas."""
+    """Return the names of those flags that are True, joined by commas."""
     return ", ".join(name for name in names if structure.flag(name))

@@ -1,7 +1,7 @@
 """Read OpenFAST's input files by the names of their lines.
 
-A line is `value  Name  - comment`. OpenFAST itself reads by line number, so that a reader by line
-number knows one generation of files; names hardly change from FAST v8 to OpenFAST 5.
+A line is `value  Name  - comment`. OpenFAST itself reads files by line number. But line numbers
+differ between its versions, and the names hardly differ from FAST v8 to OpenFAST 5.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from rotor_mbs.scenario import keys
 from rotor_mbs.scenario.keys import Kind
 from rotor_mbs.scenario.toml_file import TableError, shown_path
 
-MAX_BYTES = 32 << 20
-MAX_ROWS = 100_000  # of a table; real ones have 10 to 200
-# Header and description of a file, which are text of any form.
+MAX_BYTES = 32 << 20  # largest size of a file
+MAX_ROWS = 100_000  # largest number of rows of a table; tables in use have 10 to 200
+# Number of lines at the start of a file that have no names: header and description, both free text.
 _TITLE_LINES = 2
 _NAME = re.compile(r"[A-Za-z_]\w*(?:\(\d+\))?")
 _VALUE = re.compile(r"\"([^\"]*)\"|'([^']*)'|([^\s,;]+)")
-# Fortran's numbers: 1.5, .5, 5., 1E3, 1.0D5.
+# A number as Fortran reads it: 1.5, .5, 5., 1E3, 1.0D5.
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?")
 _FLAGS = {
     "t": True, "true": True, ".true.": True, ".t.": True,
@@ -35,8 +35,8 @@ class InputFile:
 
     Attributes
     ----------
-    path : of the file.
-    lines : its lines, without line ends.
+    path : path of the file.
+    lines : lines of the file, without line ends.
 
     Raises
     ------
@@ -49,8 +49,9 @@ class InputFile:
 
         Parameters
         ----------
-        path : of the file.
-        named_by : the file, line and name that refer to it, for messages: "a.fst:31: EDFile".
+        path : path of the file.
+        named_by : file, line and name that refer to this file, for messages, such as
+            "a.fst:31: EDFile"; "" for none.
         what : kind of the file, for messages.
 
         Raises
@@ -75,17 +76,21 @@ class InputFile:
         try:
             text = content.decode("utf-8-sig")
         except UnicodeDecodeError:
-            text = content.decode("latin-1")  # every file can be read so
-        # Only these end a line; `splitlines` knows others, which comments may contain.
+            text = content.decode("latin-1")  # never fails
+        # Lines end at these characters only. `splitlines` would also end them at other characters,
+        # which comments may contain.
         self.lines = re.split(r"\r\n|\n|\r", text)
 
     @cached_property
     def _entries(self) -> dict[str, tuple[int, list[str]]]:
-        """Return line number and values by plain name; of a name that occurs twice, the first."""
+        """Return the line number and the values of each line by its plain name (`_plain`).
+
+        If several lines have a name, the first of them counts.
+        """
         entries: dict[str, tuple[int, list[str]]] = {}
         for number, line in enumerate(self.lines[_TITLE_LINES:], _TITLE_LINES + 1):
             name, values = _split_line(line)
-            if name == "outlist":  # channels follow, whose names are no keys
+            if name == "outlist":  # the lines that follow are names of channels
                 break
             if name:
                 entries.setdefault(name, (number, values))
@@ -93,11 +98,11 @@ class InputFile:
 
     @property
     def description(self) -> str:
-        """Return its second line, which is free text."""
+        """Return the description: the second line of the file, which is free text."""
         return self.lines[1].strip() if len(self.lines) > 1 else ""
 
     def __contains__(self, name: str) -> bool:
-        """Return whether there is a line of this name."""
+        """Return whether the file has a line of this name."""
         return _plain(name) in self._entries
 
     def where(self, name: str) -> str:
@@ -106,7 +111,7 @@ class InputFile:
         return f"{shown}:{entry[0]}: {name}" if entry else f"{shown}: {name}"
 
     def problem(self, name: str, what: str, allowed: str) -> InputError:
-        """Return the error of a line: what is wrong with it, and what is allowed."""
+        """Return an error that names a line, what is wrong with it, and what is allowed."""
         return InputError(f"{self.where(name)}: {what}; allowed: {allowed}")
 
     def number(self, name: str, kind: Kind = keys.NUMBER, default: float | None = None) -> float:
@@ -114,14 +119,15 @@ class InputFile:
 
         Parameters
         ----------
-        name : of the line.
-        kind : what it may be.
-        default : where there is no such line.
+        name : name of the line.
+        kind : kind of the number, which defines the allowed values.
+        default : result if there is no such line.
 
         Raises
         ------
         InputError
-            If there is no such line and no default, or if the number is not allowed.
+            If there is no such line and no default, if its value is not one number, or if the
+            number is not allowed.
         """
         if default is not None and name not in self:
             return default
@@ -130,7 +136,7 @@ class InputFile:
         if not _NUMBER.fullmatch(text):
             raise self.problem(name, f"{text[:40]!a} is not a number", allowed)
         values = self._entries[_plain(name)][1]
-        # Of "1,5", with a decimal comma, the first value is 1.
+        # "1,5" with a decimal comma is read as the two values 1 and 5.
         if len(values) > 1:
             found = f"{len(values)} values, {', '.join(values)[:40]!a}"
             raise self.problem(name, found, f"{allowed}, with a decimal point")
@@ -142,7 +148,19 @@ class InputFile:
         return read
 
     def whole(self, name: str, lowest: int, highest: int, default: int | None = None) -> int:
-        """Return the whole number in the line of this name; as `number`."""
+        """Return the whole number in the line of this name.
+
+        Parameters
+        ----------
+        name : name of the line.
+        lowest, highest : smallest and largest number allowed.
+        default : result if there is no such line.
+
+        Raises
+        ------
+        InputError
+            In the same cases as `number`.
+        """
         if default is not None and name not in self:
             return default
         number = self.number(name)
@@ -152,7 +170,10 @@ class InputFile:
         return int(number)
 
     def flag(self, name: str, *, default: bool = False) -> bool:
-        """Return the first flag in the line of this name, `default` where there is no such line."""
+        """Return the first flag in the line of this name; `default` if there is no such line.
+
+        Raises InputError if the first value of the line is not a flag.
+        """
         if name not in self:
             return default
         text = self._first_value(name)
@@ -161,13 +182,27 @@ class InputFile:
         return _FLAGS[text.lower()]
 
     def file(self, name: str, what: str) -> InputFile:
-        """Return the file that the line of this name gives, relative to this one."""
-        # Written on Windows, read anywhere.
+        """Return the file whose path, relative to this file, is in the line of this name.
+
+        Parameters
+        ----------
+        name : name of the line.
+        what : kind of the file, for messages.
+
+        Raises
+        ------
+        InputError
+            If there is no such line, or the file cannot be read.
+        """
+        # Paths that were written on Windows have backslashes.
         relative = self._first_value(name).replace("\\", "/")
         return InputFile(self.path.parent / relative, self.where(name), what)
 
     def _first_value(self, name: str) -> str:
-        """Return the first value in the line of this name. Raises InputError without the line."""
+        """Return the text of the first value in the line of this name.
+
+        Raises InputError if there is no such line.
+        """
         entry = self._entries.get(_plain(name))
         if entry is None:
             allowed = "a file of FAST v8 or OpenFAST, with `value  Name  - comment` in a line"
@@ -175,7 +210,7 @@ class InputFile:
         return entry[1][0]
 
     def line_with(self, *words: str) -> int:
-        """Return the index of the first line that has all these words; -1 where none has."""
+        """Return the index of the first line that has all these words; -1 if no line has."""
         wanted = {word.lower() for word in words}
         for index, line in enumerate(self.lines):
             if wanted <= set(line.lower().split()):
@@ -196,15 +231,15 @@ class InputFile:
 
         Parameters
         ----------
-        first : index of the line of the first row.
-        count : how many rows.
-        what : a row is, for messages.
-        width : how many numbers a row has at least.
+        first : index of the line with the first row.
+        count : number of rows.
+        what : name of a row in messages, such as "station".
+        width : smallest number of numbers in a row.
 
         Raises
         ------
         InputError
-            For a row of too few numbers, or one that is not finite.
+            If a row has too few numbers, or a number that is too large.
         """
         rows = []
         for index in range(first, first + count):
@@ -219,19 +254,23 @@ class InputFile:
 
 
 def _plain(name: str) -> str:
-    """Return a name as it is looked up: `BldFile(1)` and `BldFile1` are one."""
+    """Return the plain form of a name: lower case, without parentheses.
+
+    OpenFAST's files have both `BldFile(1)` and `BldFile1`.
+    """
     return re.sub(r"[()]", "", name).lower()
 
 
 def _split_line(line: str) -> tuple[str, list[str]]:
-    """Return the plain name and the values of a line; "" and [] if it has none.
+    """Return the plain name and the values of a line; "" and [] if it has no name.
 
-    The first word is a value. Numbers, flags and texts in quotes behind it are values, too, since
-    some lines are lists: `30, 60  LinTimes  - comment`.
+    The first word of a line is a value. Numbers, flags and texts in quotes that follow it are
+    values, too, because a line may have a list: `30, 60  LinTimes  - comment`. The next word is the
+    name.
 
     Parameters
     ----------
-    line : of an input file of OpenFAST.
+    line : line of an input file of OpenFAST.
     """
     if line.lstrip()[:2] in ("--", "==") or line.lstrip()[:1] in ("!", "#", "%"):
         return "", []
@@ -252,10 +291,10 @@ def _split_line(line: str) -> tuple[str, list[str]]:
 
 
 def _numbers_of_row(line: str) -> list[float]:
-    """Return the numbers that a row of a table begins with.
+    """Return the numbers with which a row of a table begins.
 
-    They are parted by blanks, or by commas with or without blanks. In a row that has blanks without
-    a comma, a comma within a number is a decimal comma: this is no number.
+    They are separated by blanks, or by commas with or without blanks. If two of them are separated
+    by blanks alone, a comma within a word is a decimal comma, and the word is no number.
     """
     has_blanks = re.search(r"[^\s,]\s+[-+.\d]", line) is not None
     words = line.split() if has_blanks else line.replace(",", " ").split()
@@ -269,11 +308,18 @@ def _numbers_of_row(line: str) -> list[float]:
 
 
 def _as_number(text: str) -> float:
-    """Return one of Fortran's numbers as a float, infinite where it is too large."""
+    """Return the float of a number as Fortran reads it; infinite if the number is too large."""
     return float(text.lower().replace("d", "e"))
 
 
 def table_columns(file: InputFile, header: int, names: Sequence[str]) -> list[int]:
-    """Return at which places the columns of these names stand in the header line of a table."""
+    """Return the indices of the columns with these names in a table.
+
+    Parameters
+    ----------
+    file : file with the table.
+    header : index of the line with the names of the columns.
+    names : names of the columns.
+    """
     words = [word.lower() for word in file.lines[header].split()]
     return [words.index(name.lower()) for name in names]

@@ -1,4 +1,7 @@
-"""Write a scene file for an OpenFAST model, with comments on what of the model it holds."""
+"""Write a scene file for the rotor of an OpenFAST model.
+
+Comments in the file name the sources of its numbers, and what of the model is left out.
+"""
 
 from __future__ import annotations
 
@@ -13,36 +16,38 @@ from rotor_mbs.scenario.openfast import BladeModel, OpenFastRotor, plain_number,
 from rotor_mbs.scenario.scene import Scene, parse_scene
 from rotor_mbs.scenario.toml_file import file_path, shown_path, toml_value
 
-# A model may run for 10 minutes or more; of a rigid rotor the first turns say enough, and every
-# method runs them within seconds.
-MAX_DURATION = 20.0  # s
-SAMPLE_STEP = 0.05  # s
-# A pitch that the model prescribes is kept by a spring where it is a coordinate of the scene. The
-# spring is this fast, so that the weight of a blade moves the pitch by about 1 mrad.
-HOLDING_FREQUENCY, HOLDING_DAMPING = 5.0, 0.7  # Hz, of critical damping
-_WIDTH = 100
+# Longest duration (s) of the scene. The model's run may take 10 minutes or more. The first turns
+# are enough for a rigid rotor, and every method computes them within seconds.
+MAX_DURATION = 20.0
+SAMPLE_STEP = 0.05  # s, time between samples
+# Frequency (Hz), and damping as a share of critical damping, of the springs that hold pitches which
+# the model prescribes but which are coordinates of the scene. At this frequency the weight of a
+# blade moves the pitch by about 1 mrad only.
+HOLDING_FREQUENCY, HOLDING_DAMPING = 5.0, 0.7
+_WIDTH = 100  # largest length of a comment line
 
 
 def scene_from_openfast(path: str | os.PathLike[str]) -> Scene:
     """Return the scene of an OpenFAST model's rotor, as `rotor-mbs new FILE --from MODEL.fst` does.
 
-    Masses are those that OpenFAST computes with. What the model has and a scene has not, such as
-    aerodynamics, is in the comments of the scene's `text`, a scene file.
+    The masses are those with which OpenFAST computes. Parts of the model that a scene cannot have,
+    such as aerodynamics, are named in comments of the scene file, the attribute `text` of the
+    scene.
 
     Parameters
     ----------
-    path : of the .fst file. FAST v8 and OpenFAST up to version 5 are read.
+    path : path of the .fst file. Files of FAST v8 and of OpenFAST up to version 5 are read.
 
     Returns
     -------
     Scene
-        Named after the file.
+        The scene, with the name of the .fst file.
 
     Raises
     ------
     InputError
-        For a file or line that is missing, a number that is not allowed, and a model of which no
-        scene can be made; with file, line and name.
+        If a file or line is missing, a number is not allowed, or no scene can be made from the
+        model. The message has the file, the line and its name.
     TypeError
         If `path` is neither text nor a path.
 
@@ -56,23 +61,26 @@ def scene_from_openfast(path: str | os.PathLike[str]) -> Scene:
 
 
 def scene_of_rotor(rotor: OpenFastRotor) -> Scene:
-    """Return the scene of a rotor that was read; as `scene_from_openfast`."""
+    """Return the scene of a rotor that was read from an OpenFAST model.
+
+    Raises InputError if a number of the model is not allowed in a scene.
+    """
     name = re.sub(r"[^A-Za-z0-9._-]+", "-", rotor.path.stem).lstrip(".") or "rotor"
     try:
         return parse_scene(scene_text(rotor), name)
     except InputError as error:
-        # The reader allows what OpenFAST allows; a scene may allow less, of a mass of 1e30 kg.
+        # A scene does not allow all numbers that OpenFAST allows, such as a mass of 1e30 kg.
         shown = shown_path(rotor.path)
         lines = [f"{shown}: of the scene made of it: {line}" for line in error.problems]
         raise InputError(lines) from error
 
 
 def scene_text(rotor: OpenFastRotor) -> str:
-    """Return a commented scene file of a rotor.
+    """Return the text of a scene file, with comments, for a rotor.
 
     Parameters
     ----------
-    rotor : as it was read from the OpenFAST model.
+    rotor : rotor that was read from an OpenFAST model.
     """
     duration = min(rotor.duration, MAX_DURATION) or 10.0
     title = _on_one_line(f"{rotor.path.stem}: {rotor.description}")[:MAX_TEXT].rstrip(": ")
@@ -101,7 +109,7 @@ def scene_text(rotor: OpenFastRotor) -> str:
 
 
 def _left_out_comments(rotor: OpenFastRotor) -> list[str]:
-    """Return comment lines on what the model has and the scene has not, and how to compare."""
+    """Return comment lines on what of the model is not in the scene, and on a fair comparison."""
     lines = ["#"]
     if rotor.left_out:
         lines.append("# In the model and not in this scene, the most important first:")
@@ -116,12 +124,12 @@ def _left_out_comments(rotor: OpenFastRotor) -> list[str]:
 
 
 def _blade_lines(blade: BladeModel, rotor: OpenFastRotor) -> list[str]:
-    """Return the entries of the table of a blade, with comments on their sources.
+    """Return the lines of a blade's table except its header, with comments on the sources.
 
     Parameters
     ----------
     blade : the blade.
-    rotor : its rotor, for the hub radius.
+    rotor : rotor of the blade, whose hub radius is used.
     """
     x, y, z = blade.centre_of_mass
     tip_x, tip_y, tip_z = blade.tip
@@ -156,11 +164,11 @@ def _blade_lines(blade: BladeModel, rotor: OpenFastRotor) -> list[str]:
 
 
 def _hub_and_start_lines(rotor: OpenFastRotor) -> list[str]:
-    """Return the lines of the tables of the hub, the initial state and the torque.
+    """Return the lines of the tables [hub], [initial] and [torque].
 
     Parameters
     ----------
-    rotor : as it was read from the OpenFAST model.
+    rotor : rotor that was read from an OpenFAST model.
     """
     azimuth = rotor.azimuth - rotor.azimuth_up
     angles = [_angle(azimuth), *(_angle(-blade.pitch) for blade in rotor.blades)]
@@ -186,12 +194,13 @@ def _hub_and_start_lines(rotor: OpenFastRotor) -> list[str]:
 
 
 def _bearing_lines(rotor: OpenFastRotor) -> list[str]:
-    """Return the lines of the table of the pitch bearings; none if no pitch can move.
+    """Return the lines of the table [bearing]; no lines if no blade has a pitch inertia.
+
+    If the model prescribes the pitch, the lines have an assumed spring and damper.
 
     Parameters
     ----------
-    rotor : as it was read from the OpenFAST model. If it prescribes the pitch, a spring and damper
-        are assumed.
+    rotor : rotor that was read from an OpenFAST model.
     """
     rests = [-blade.pitch for blade in rotor.blades]
     if rotor.bearing:
@@ -232,7 +241,10 @@ def _pitch_inertia(blade: BladeModel) -> float:
 
 
 def mapping_text(rotor: OpenFastRotor) -> str:
-    """Return a mapping file for the output of the model, for `rotor-mbs compare --columns`."""
+    """Return the text of a mapping file for `rotor-mbs compare --columns`.
+
+    The file describes the output columns of the OpenFAST model.
+    """
     lines = [
         *_comment(f"Columns of the output of {rotor.path.name} (.out or .outb), for:"),
         "#   rotor-mbs compare OUTPUT --scene SCENE --columns THIS",
@@ -251,12 +263,12 @@ def mapping_text(rotor: OpenFastRotor) -> str:
 
 
 def _on_one_line(text: str) -> str:
-    """Return a text without control characters, each run of blanks as one."""
+    """Return a text without control characters, with single blanks between words."""
     return " ".join("".join(c if c.isprintable() else " " for c in text).split())
 
 
 def _comment(text: str, indent: str = "") -> list[str]:
-    """Return a text as comment lines; lines but the first begin with `indent`."""
+    """Return a text as comment lines; `indent` is put before all lines except the first."""
     return textwrap.wrap(
         _on_one_line(text),
         _WIDTH,
@@ -266,25 +278,25 @@ def _comment(text: str, indent: str = "") -> list[str]:
 
 
 def _number(number: float) -> str:
-    """Return a number in TOML, without the sign of a zero."""
+    """Return the TOML text of a number; a negative zero becomes 0.0."""
     return repr(number + 0.0)
 
 
 def _angle(degrees: float) -> str:
-    """Return an angle in TOML, "deg(-2.5)" in quotes."""
+    """Return the TOML text of an angle: "deg(-2.5)" in quotes, or 0.0."""
     return f'"deg({plain_number(degrees)})"' if degrees else "0.0"
 
 
 def _entry(key: str, number: float, comment: str) -> str:
-    """Return the line of a number."""
+    """Return a line with a key, a number and a comment."""
     return f"{key} = {_number(number)}   # {comment}"
 
 
 def _angle_entry(key: str, degrees: float, comment: str) -> str:
-    """Return the line of an angle."""
+    """Return a line with a key, an angle and a comment, which begins with the unit rad."""
     return f"{key} = {_angle(degrees)}   # rad; {comment}"
 
 
 def _one_or_list(entries: Sequence[str]) -> str:
-    """Return one value where all are equal, else the list of them."""
+    """Return the first entry if all entries are equal, otherwise the TOML text of their list."""
     return entries[0] if len(set(entries)) == 1 else f"[{', '.join(entries)}]"
