@@ -1,6 +1,6 @@
 """Define what pages are made of: sentences, facts, plots, tables, sections.
 
-All are plain data; templates turn them into HTML.
+These elements are plain data. Templates turn them into HTML.
 """
 
 from __future__ import annotations
@@ -24,15 +24,17 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class TableCell:
-    """A cell of a table that is more than a text.
+    """A cell of a table with more than a text: a link, a note, a colour or a drawing.
 
-    tone : "good" or "bad", the colour of a verdict.
-    href : address of a link.
-    note, note_language : small text below, and its language where it is not English.
-    mark : classes of the whole cell.
+    text : main text of the cell.
+    tone : "good" or "bad" for the colour of a verdict; "" for no colour.
+    href : address to which the text is linked; "" for no link.
+    note : small text below the main text.
+    note_language : language code of the note; "" for English.
+    mark : CSS classes of the whole cell.
     title : text that appears under the pointer and that a screen reader reads.
-    order : the number by which the column is sorted; None: by the text.
-    picture : a drawing above the text.
+    order : number by which a click on the column's heading sorts the row; None: the text is used.
+    picture : HTML of a drawing above the text.
     """
 
     text: str
@@ -48,18 +50,20 @@ class TableCell:
 
 Row = Sequence[TableCell | str]
 
-# What stands in a column of numbers where there is none.
+# Texts that stand in a column of numbers in place of a number.
 _NO_NUMBER = ("never", "exact", "runs away", "not measured", "not reached")
 
 
 @dataclass(frozen=True)
 class PageTable:
-    """A table. The first cell of a row is its heading; an empty column is left out.
+    """A table. The first cell of each row is the heading of the row.
 
-    caption : for a screen reader.
+    A column without content, except the first, is left out.
+
+    caption : text that a screen reader reads.
     head : headings of the columns.
-    rows : as many cells each as there are headings.
-    wide : places of the columns that a narrow page does not show.
+    rows : rows of the table; a row has one cell for each heading.
+    wide : indices of the columns that a narrow page does not show.
     sortable : whether a click on a heading sorts the rows.
     """
 
@@ -71,11 +75,12 @@ class PageTable:
     kind: str = field(default="table", init=False)
 
     def columns(self) -> list[tuple[int, TableCell | str, str]]:
-        """Return place, heading and classes of each column that is shown.
+        """Return the index, the heading and the CSS classes of each column that is shown.
 
-        The class "n" aligns numbers on the right; it is that of a column, but for the first, of
-        which more than half of the texts begin with a digit, words in place of a number aside. The
-        class "wide" hides a column on a narrow page.
+        A column is shown if it is the first one, or if some cell of it is neither empty nor a
+        dash. The class "wide" hides a column on a narrow page. The class "n" aligns numbers on the
+        right. A column has this class if more than half of its texts begin with a digit; words
+        that replace a number do not count. The first column never has it.
         """
         shown = []
         for place, heading in enumerate(self.head):
@@ -104,11 +109,13 @@ class PageTable:
 
 @dataclass(frozen=True)
 class Horizontal:
-    """The horizontal axis of plots. Plots whose axes have one name are zoomed and read together.
+    """The horizontal axis of a plot.
 
-    name, unit : such as "time" and "s".
-    symbol : what stands before a value that is read, "t".
-    first, last : the range.
+    Plots whose axes have the same name are zoomed together, and their values are read together.
+
+    name, unit : name and unit of the quantity on the axis, such as "time" and "s".
+    symbol : symbol of the quantity, such as "t", that the page shows before a value of it.
+    first, last : values at the ends of the axis.
     log : whether the axis is logarithmic.
     """
 
@@ -124,13 +131,16 @@ class Horizontal:
 class Curve:
     """A curve of a plot.
 
-    key : by which a legend switches it, the same in all plots of a section.
-    look : colour and line; its label is the name of the curve.
+    key : key by which a legend switches the curve on and off. Curves of several plots in a section
+        may have the same key.
+    look : colour and line of the curve. Its label is the name of the curve.
     x : (n,) ascending.
-    y : (n,), or (runs, n) of which one row is shown.
-    breaks : samples before which the line is interrupted: the first one after a jump.
-    dots : "" for a line alone; any other text marks the points; "only": no line joins them.
-    beside : text at the curve's end in the plot; "" for none.
+    y : (n,); or (runs, n), a table of which the page shows one row.
+    breaks : indices of the samples before which the line is interrupted. Each is the first sample
+        after a jump.
+    dots : "" for a line without marked points, "line" for a line with them, "only" for points that
+        no line joins.
+    beside : text in the plot at the end of the curve; "" for none.
     """
 
     key: str
@@ -155,15 +165,18 @@ class Mark:
 class Plot:
     """A plot that the page's script draws.
 
-    name, unit : of the quantity on the vertical axis.
+    name, unit : name and unit of the quantity on the vertical axis.
     x : the horizontal axis.
-    height : of the drawing, px.
-    note : more of the vertical axis, in small letters.
-    log : whether the vertical axis is logarithmic; values that are not positive are gaps.
-    clip : range beyond which curves are cut off, until the reader asks for it; None: there is none.
+    curves : the curves. Later ones are drawn over earlier ones.
+    height : height of the drawing, px.
+    note : addition to name and unit, in small letters.
+    log : whether the vertical axis is logarithmic. Values that are not positive are then gaps.
+    clip : range of the vertical axis. Curves are cut off beyond it until the reader asks for the
+        full range. None: no curve is cut off.
     marks : lines across the plot.
-    least : a smaller range of the values is rounding error and not magnified.
-    still : whether there is a picture of it for a page without scripts.
+    least : smallest range of values that fills the plot. A smaller range is rounding error and is
+        not magnified.
+    still : whether the page also has a still picture of the plot, for browsers without scripts.
     """
 
     name: str
@@ -180,11 +193,14 @@ class Plot:
     kind: str = field(default="plot", init=False)
 
     def described(self, store: CurveStore) -> dict[str, Any]:
-        """Return what the script needs, ready for JSON; the numbers go to the store.
+        """Return the plot as a dict for JSON, which the page's script draws.
+
+        The numbers of the curves are added to the store. The dict only says where they are.
 
         Parameters
         ----------
-        store : takes the columns of all curves; its step also divides the places of breaks.
+        store : store of the page's numbers. If it stores only every n-th sample of a curve, the
+            indices of breaks are divided by n.
         """
         x = self.x
         plot: dict[str, Any] = {
@@ -224,9 +240,10 @@ class Plot:
 
 @dataclass(frozen=True)
 class Legend:
-    """The curves of a section: (key, look) each.
+    """The legend of the curves in a section.
 
-    Buttons switch the curves; a legend whose keys are empty is a mere list.
+    items : (key, look) of each curve. An item with a key is a button that switches the curves with
+        this key. An item with the key "" is text without a button.
     """
 
     items: Sequence[tuple[str, Look]]
@@ -235,7 +252,7 @@ class Legend:
 
 @dataclass(frozen=True)
 class Note:
-    """A small text."""
+    """A paragraph in small letters."""
 
     text: str | Markup
     kind: str = field(default="note", init=False)
@@ -243,7 +260,11 @@ class Note:
 
 @dataclass(frozen=True)
 class Viewer:
-    """The moving rotor: what `pages.viewer` makes for the script, and the title of the scene."""
+    """The animation of the rotor.
+
+    data : result of `pages.viewer.viewer`, which the script draws.
+    title : title of the scene.
+    """
 
     data: Mapping[str, Any]
     title: str
@@ -252,7 +273,7 @@ class Viewer:
 
 @dataclass(frozen=True)
 class SourceText:
-    """A file's text."""
+    """The text of a file."""
 
     text: str
     kind: str = field(default="source", init=False)
@@ -260,7 +281,7 @@ class SourceText:
 
 @dataclass(frozen=True)
 class Listing:
-    """A list of (what, text)."""
+    """A list of terms and their texts: (term, text) each."""
 
     items: Sequence[tuple[str, str | Markup]]
     kind: str = field(default="listing", init=False)
@@ -268,9 +289,10 @@ class Listing:
 
 @dataclass(frozen=True)
 class Matrix:
-    """A matrix of formulas, with a text above.
+    """A matrix of formulas with a text above it.
 
-    rows : (entry as printed, the correct one) each; None where the printed one is correct.
+    rows : entries by row, each a pair (entry as printed, correct entry). The correct entry is None
+        if the printed entry is correct.
     """
 
     text: str
@@ -282,12 +304,15 @@ class Matrix:
 class HeatMap:
     """A map of runs over two parameters.
 
-    It has a cell of equal size for each pair of values, in which the script writes a quantity of
-    the run.
+    The map has a cell for each pair of values of the parameters. All cells have the same size. The
+    page's script writes a quantity of the run into its cell.
 
-    quantities : names of what may be shown.
-    columns, rows : values of the parameters as text, from left to right, from top to bottom.
-    cells : a row of (number of the run, class) for each of `rows`; None where there is no run.
+    label : text that a screen reader reads.
+    quantities : names of the quantities from which the reader chooses.
+    columns, rows : values of the two parameters as text, from left to right and from top to bottom.
+    cells : for each of `rows` the cells of its row, each a pair (index of the run, CSS class); None
+        if there is no run with these values.
+    note : text below the map.
     """
 
     label: str
@@ -301,7 +326,10 @@ class HeatMap:
 
 @dataclass(frozen=True)
 class RunChoice:
-    """A list of runs (number, text), one of which is shown."""
+    """A menu from which the reader chooses the run whose curves are shown.
+
+    runs : (index, text) of each run.
+    """
 
     runs: Sequence[tuple[int, str]]
     kind: str = field(default="choice", init=False)
@@ -324,9 +352,10 @@ Element = (
 
 @dataclass(frozen=True)
 class Grid:
-    """Cards side by side, `columns` in a row on a wide page.
+    """Cards side by side.
 
-    The elements of a card are placed one below the other.
+    columns : number of cards in a row on a wide page.
+    cards : for each card its elements, which are placed one below the other.
     """
 
     columns: int
@@ -347,11 +376,12 @@ class Fold:
 
 @dataclass(frozen=True)
 class Section:
-    """A part of a page. One without elements is left out.
+    """A part of a page. A section without elements is left out.
 
-    id : name in addresses.
-    heading, say : the heading, and a line below it.
-    elements : a legend among them switches the curves of this section alone.
+    id : name of the section in addresses.
+    heading : heading of the section.
+    elements : content of the section. A legend switches only curves of its own section.
+    say : text below the heading.
     """
 
     id: str
@@ -362,11 +392,12 @@ class Section:
 
 @dataclass(frozen=True)
 class Fact:
-    """One of the numbers at the top of a page.
+    """A result at the top of a page.
 
-    name, value : what it is, and the number as text.
-    note : what else is to be known of it.
-    tone : "good" or "bad", the colour of the value.
+    name : name of the result.
+    value : the result as text, usually a number.
+    note : explanation below the value.
+    tone : "good" or "bad" for the colour of the value; "" for no colour.
     """
 
     name: str
@@ -379,12 +410,14 @@ class Fact:
 class PageContent:
     """The content of a page.
 
-    title, about : the heading and the small line below it.
-    answer : sentences of what was found, from the file's numbers.
-    facts : at most four of these numbers.
+    title : heading of the page.
+    about : small line below the heading.
+    answer : sentences on the results, with numbers from the file.
+    facts : the main results, which stand at the top of the page; at most four.
     sections : the parts of the page, in order.
-    previous, following : file and name of the pages before and after this one; None: there is none.
-    data : for a script of this page alone, by the id of its element.
+    previous, following : file and name of the page before and of the page after this one; None if
+        there is no such page.
+    data : data for a script that only this page has, by the id of the HTML element that holds them.
     """
 
     title: str
@@ -392,6 +425,6 @@ class PageContent:
     answer: Sequence[Markup]
     facts: Sequence[Fact]
     sections: Sequence[Section]
-    previous: tuple[str, str] | None = None  # file and name of the page before
+    previous: tuple[str, str] | None = None
     following: tuple[str, str] | None = None
     data: Mapping[str, object] = field(default_factory=dict)

@@ -1,6 +1,7 @@
 """Turn stored data into the content of pages, one module per page.
 
-Here is what several pages have: the report itself, cells, tables and sentences about stored runs.
+This module has the parts that several pages share: the open report, and cells, tables and sentences
+about stored runs.
 """
 
 from __future__ import annotations
@@ -33,22 +34,27 @@ from rotor_mbs.studies.stability import OUTCOMES, SUITE, SuiteRun, suite_runs
 
 
 class Report(OpenResults):
-    """An open results file with what its pages show of it. What no page asks for is not read."""
+    """An open results file with the data that several pages of its report show.
+
+    Each property is computed when a page first reads it.
+    """
 
     @cached_property
     def is_suite(self) -> bool:
-        """Return whether the file is of the stability suite.
+        """Return whether the file has the runs of the stability suite.
 
-        It is if it has ladders of steps, or if all its scenes are of the suite.
+        This is the case if the file has ladders of steps, or if all its scenes with methods belong
+        to the suite.
         """
         folders = {name.partition("/")[0] for name, scene in self.scenes.items() if scene.methods}
         return bool(read_records(self.path, "stability")) or (bool(folders) and folders <= {*SUITE})
 
     @cached_property
     def files(self) -> Mapping[str, str]:
-        """Return the file of each scene's page, in order.
+        """Return the file names of the scenes' pages by scene, in the order of the pages.
 
-        Of a file with one scene, that is not of the suite, it is the index.
+        If the results file has a single scene, and is not of the stability suite, the scene's page
+        is the index.
         """
         names = [name for name, scene in self.scenes.items() if scene.methods or not self.is_suite]
         if len(names) == 1 and not self.is_suite:
@@ -62,22 +68,24 @@ class Report(OpenResults):
 
     @cached_property
     def conditions(self) -> Mapping[str, str]:
-        """Return conditions that were found out, since the paper does not print them.
+        """Return conditions that the paper's numbers depend on, but that the paper does not print.
 
-        The keys are subjects or names of scenes.
-
-        None are returned where the file has no scene with claims.
+        The conditions are texts by subject or scene. The mapping is empty if there are no claims
+        about the scenes of the file.
         """
         return published.conditions() if self.claims else {}
 
     @cached_property
     def study(self) -> ClaimStudy | None:
-        """Return verdicts on the claims from many runs with moved starts; None without claims."""
+        """Return the verdicts on the paper's claims; None if no claim is about these scenes.
+
+        The verdicts come from many runs with slightly changed initial states, not from this file.
+        """
         return published.claim_study() if self.claims else None
 
     @cached_property
     def errata(self) -> Sequence[Erratum]:
-        """Return the errors in the printed equations; none where no run has such equations."""
+        """Return the errors in the printed equations; none if no run of the file has them."""
         printed = {PRINTED, *errata_methods().values()}
         return (
             published.errata()
@@ -92,7 +100,7 @@ class Report(OpenResults):
 
     @cached_property
     def suite_runs(self) -> Sequence[SuiteRun]:
-        """Return the runs of the stability suite; none where the file is not of it."""
+        """Return the runs of the stability suite; none if the file is not of the suite."""
         return suite_runs(self.path) if self.is_suite else ()
 
 
@@ -116,16 +124,17 @@ METRICS = (
     "run_time_s",
     "setup_time_s",
 )
-# Errors against the reference, which has none of its own.
+# Metrics that compare a run with the reference. They are not shown for the reference itself.
 _ERRORS_OF_RUNS = ("angle_error_max", "angle_error_predicted", "angle_error_whole", "tip_error_max")
-_SPAN = 30.0  # ratio of largest to smallest value beyond which an axis is logarithmic
-_METHODS_IN_A_TABLE = 8  # side by side on a page of 1440 px
+# If the ratio of the largest to the smallest value is above this number, an axis is logarithmic.
+_SPAN = 30.0
+_METHODS_IN_A_TABLE = 8  # number of columns for which a page of 1440 px has room
 
 
 def status_text(run: StoredRun) -> str:
-    """Return a run's status in words: "solver failed" for "solver_failed".
+    """Return the status of a run in words: "solver failed" for "solver_failed".
 
-    Equations that are not claimed to be correct are never "ok" but "completed".
+    A run of equations that are not claimed to be correct is never "ok". It is "completed" instead.
     """
     return words_of(
         "completed" if run.status == "ok" and not is_corrected(run.method) else run.status
@@ -138,13 +147,13 @@ def words_of(status: str) -> str:
 
 
 def status_cell(run: StoredRun, suite_run: SuiteRun | None = None) -> TableCell:
-    """Return the status of a run, and the reason where it is not ok.
+    """Return a cell with the status of a run, and with the reason if the run is not ok.
 
     Parameters
     ----------
     run : the stored run.
-    suite_run : the same run in the stability suite, if it is of it; what its ladder found is shown
-        where it differs from the status.
+    suite_run : the outcome of the same run in the stability suite; None if the file is not of the
+        suite. If the outcome differs from the status, the cell has the outcome.
     """
     text, message = status_text(run), str(run.attributes.get("message", ""))
     tone = "good" if text == "ok" else "" if run.status in GOOD else "bad"
@@ -158,13 +167,19 @@ def status_cell(run: StoredRun, suite_run: SuiteRun | None = None) -> TableCell:
 
 
 def method_cell(name: str) -> TableCell | str:
-    """Return a method's label, and below it the name that the command line and the file have."""
+    """Return a cell with the label of a method.
+
+    Below the label is the method's name, which the command line and the file have.
+    """
     label = label_of(name)
     return label if label == name else TableCell(label, note=name)
 
 
 def run_cell(run: StoredRun) -> TableCell | str:
-    """Return a run's method, and below it the settings that are not the method's defaults."""
+    """Return a cell with the label of a run's method.
+
+    Below the label are the method's name and the settings that differ from its defaults.
+    """
     method = find_method_or_none(run.method)
     defaults = {} if method is None else method.defaults
     own = [
@@ -177,27 +192,34 @@ def run_cell(run: StoredRun) -> TableCell | str:
 
 
 def metric(run: StoredRun, name: str) -> float | None:
-    """Return a number stored with the run; None where it has none."""
+    """Return a metric of a stored run; None if the run does not have it."""
     value = run.attributes.get(name)
     return float(value) if isinstance(value, float | int) else None
 
 
 def number_cell(value: float | None, tone: str = "") -> TableCell:
-    """Return a cell with a number, by which a table is sorted; `tone` is that of the cell."""
+    """Return a cell with a number, by which its column is sorted.
+
+    Parameters
+    ----------
+    value : the number; None gives a dash.
+    tone : tone of the cell; see `TableCell`.
+    """
     order = value if value is not None and math.isfinite(value) else None
     return TableCell(number(value), tone, order=order)
 
 
 def horizon_of(scene: StoredScene) -> float | None:
-    """Return the scene's horizon in s; None where no run was compared with a reference."""
+    """Return the scene's horizon in s; None if no run was compared with a reference."""
     known = [metric(run, "horizon_s") for run in scene.runs.values()]
     return next((value for value in known if value is not None), None)
 
 
 def compared_time(scenes: Iterable[StoredScene]) -> tuple[float, float]:
-    """Return the scenes' time before their horizons, and their whole time, both in s.
+    """Return two sums over scenes, in s: the compared time, and the whole time.
 
-    Scenes without a reference have no share in either.
+    The compared time of a scene ends at its horizon. Scenes without a reference are left out of
+    both sums.
     """
     compared = whole = 0.0
     for scene in scenes:
@@ -209,21 +231,23 @@ def compared_time(scenes: Iterable[StoredScene]) -> tuple[float, float]:
 
 
 def is_wide(values: Array) -> bool:
-    """Return whether an axis of these values should be logarithmic.
+    """Return whether an axis for these values should be logarithmic.
 
-    It should, where all are positive and the largest is more than 30 times the smallest.
+    It should if all finite values are positive and the largest is more than 30 times the smallest.
     """
     known = values[np.isfinite(values)]
     return bool(len(known)) and bool(known.min() > 0.0) and bool(known.max() > _SPAN * known.min())
 
 
 def models_of(methods: Collection[str]) -> int:
-    """Return how many models these methods belong to. Models share no code."""
+    """Return the number of different models to which these methods belong."""
     return len({method.partition("/")[0] for method in methods})
 
 
 def computations(methods: Collection[str]) -> str:
-    """Return a subject that counts methods and models: "three independent computations".
+    """Return the subject of a sentence on agreement: the number of methods, and of their models.
+
+    The subject for a single method is its label. Methods of different models are independent.
 
     >>> computations(["lagrange/taylor", "exudyn_tree/rk67"])
     'two independent computations'
@@ -243,8 +267,8 @@ def computations(methods: Collection[str]) -> str:
 def agreement(scene: StoredScene) -> tuple[list[str], float | None]:
     """Return the corrected methods of a scene that are ok, and the largest of their angle errors.
 
-    Methods that were not compared with a reference are left out. The error (rad) is taken up to the
-    horizon; it is None where no method was compared.
+    Methods that were not compared with a reference are left out. The error (rad) is the largest one
+    up to the horizon. It is None if no method is left.
     """
     errors: dict[str, float] = {}
     for name, run in scene.corrected_runs.items():
@@ -255,18 +279,23 @@ def agreement(scene: StoredScene) -> tuple[list[str], float | None]:
 
 
 def agreement_of_scenes(scenes: Iterable[StoredScene]) -> tuple[list[str], float | None, int]:
-    """Return how the corrected methods agree over several scenes.
+    """Return how well the corrected methods agree over several scenes.
+
+    A scene counts as compared if one of its corrected methods is ok and was compared with a
+    reference.
 
     Parameters
     ----------
-    scenes : those without a method that was compared with a reference are left out.
+    scenes : the scenes. Scenes that do not count as compared are left out.
 
     Returns
     -------
-    methods : those that are ok in every scene that was compared; none where no method is in all.
-    error : rad, the largest angle error of any run that is ok; None where none was compared with a
-        reference.
-    count : of the scenes that were compared.
+    methods : list of str
+        Names of the methods that are ok in every compared scene.
+    error : float or None
+        Largest angle error of all runs that are ok, rad; None if no scene was compared.
+    count : int
+        Number of compared scenes.
     """
     common: list[str] = []
     errors: list[float] = []
@@ -279,14 +308,14 @@ def agreement_of_scenes(scenes: Iterable[StoredScene]) -> tuple[list[str], float
 
 
 def agree_within(methods: Sequence[str], error: float, digits: int = 1) -> Markup:
-    """Return a clause: "three independent computations agree within 2×10⁻⁶ rad".
+    """Return a clause such as "three independent computations agree within 2×10⁻⁶ rad".
 
     Parameters
     ----------
-    methods : those that agree. A single one agrees with the reference; without any, the subject is
-        all runs that are ok.
-    error : rad, the largest.
-    digits : of the error, which is rounded up.
+    methods : names of the methods that agree. If there is one, the clause says that it agrees with
+        the reference. If there is none, the subject of the clause is "all runs that are ok".
+    error : largest angle error, rad. It is rounded up.
+    digits : number of digits of the error.
     """
     within = (
         Markup("<b>exactly</b>")
@@ -299,11 +328,13 @@ def agree_within(methods: Sequence[str], error: float, digits: int = 1) -> Marku
 
 
 def reproduced(numbers: Iterable[Published]) -> tuple[int, int]:
-    """Return how many published numbers the printed, and how many the corrected equations give.
+    """Return how many published numbers are reproduced by the printed and by the corrected model.
+
+    A number is reproduced if the computed value, rounded to the published decimals, equals it.
 
     Parameters
     ----------
-    numbers : claims that are numbers; one is reproduced if it rounds to the printed digits.
+    numbers : published numbers with the computed values of both models.
     """
     printed = corrected = 0
     for claim in numbers:
@@ -313,11 +344,11 @@ def reproduced(numbers: Iterable[Published]) -> tuple[int, int]:
 
 
 def numbers_sentence(claims: Iterable[Published]) -> Markup:
-    """Return a sentence: which model gives the numbers that the paper publishes; "" without any.
+    """Return a sentence on which model reproduces the paper's numbers; "" if there is no number.
 
     Parameters
     ----------
-    claims : of the paper; those in words are ignored.
+    claims : numbers and claims of the paper. Claims in words are ignored.
     """
     numbers = [claim for claim in claims if claim.is_number]
     if not numbers:
@@ -340,7 +371,10 @@ def numbers_sentence(claims: Iterable[Published]) -> Markup:
 
 
 def agreement_text(scene: StoredScene) -> Markup:
-    """Return a sentence on how well a scene's corrected methods agree; "" where it is not known."""
+    """Return a sentence on how well a scene's corrected methods agree.
+
+    The sentence is "" if no corrected method is ok and was compared with a reference.
+    """
     methods, error = agreement(scene)
     if error is None:
         return Markup()
@@ -350,12 +384,13 @@ def agreement_text(scene: StoredScene) -> Markup:
 
 
 def agreement_table(scene: StoredScene, suite_runs: Sequence[SuiteRun] = ()) -> PageTable:
-    """Return the table of agreement: a row per run of a scene, six columns.
+    """Return a table of the status, errors and run time of each run of a scene.
 
     Parameters
     ----------
-    scene : whose runs are the rows.
-    suite_runs : the same runs in the stability suite, whose outcomes are shown.
+    scene : the scene; each of its runs is a row.
+    suite_runs : outcomes of the same runs in the stability suite; empty if the file is not of the
+        suite.
     """
     of_suite = {run.method: run for run in suite_runs}
     rows: list[Row] = []
@@ -383,13 +418,14 @@ def agreement_table(scene: StoredScene, suite_runs: Sequence[SuiteRun] = ()) -> 
 
 
 def metrics_tables(scene: StoredScene) -> list[PageTable]:
-    """Return tables of every number of every run: a row per quantity, a column per run.
+    """Return tables of the metrics of all runs of a scene: a row per metric, a column per run.
 
-    There are as many tables as a page's width requires.
+    There are several tables if the runs do not fit the width of a page. A metric that no run of a
+    table has is left out of this table.
 
     Parameters
     ----------
-    scene : whose runs are shown; quantities that no run has are left out.
+    scene : the scene.
     """
     columns = metric_columns(scene.scene.outputs)
     judged = [

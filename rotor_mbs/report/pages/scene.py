@@ -1,7 +1,8 @@
 """Build the page of a scene: what happened, loads, agreement of the methods, and all numbers.
 
-A scene of the paper shows the printed model beside the corrected one; any other scene shows the
-motion and the loads of its best run.
+The page of a scene of the paper compares the printed model with the corrected one. The page of any
+other scene shows the motion and the loads of its corrected run, or of its printed run if there is
+no corrected one.
 """
 
 from __future__ import annotations
@@ -90,7 +91,8 @@ DEFECT_NOTE = (
     "interval. Defects do not depend on the growth of errors over the run and cover all of it."
 )
 _PITCH = "Pitch angle"
-_NO_ENERGY = 1e-15  # share of the energy scale; a smaller gain is rounding error
+# Energy gains below this share of the energy scale are rounding errors.
+_NO_ENERGY = 1e-15
 _TURN = 2.0 * math.pi
 _RPM = 30.0 / math.pi  # rev/min of a rad/s
 
@@ -100,8 +102,8 @@ def scene_page(name: str, report: Report) -> PageContent:
 
     Parameters
     ----------
-    name : of the scene, a key of `report.scenes` and of `report.files`.
-    report : the open results file; the scenes before and after this one in it are linked.
+    name : name of the scene, a key of `report.scenes` and of `report.files`.
+    report : the open results file. The page has links to the pages before and after it.
     """
     scene = report.scenes[name]
     is_paper = (
@@ -123,7 +125,7 @@ def scene_page(name: str, report: Report) -> PageContent:
 
 
 def short_name(scene: str) -> str:
-    """Return "fig11" for "paper/fig11"."""
+    """Return a scene's name without its folder: "fig11" for "paper/fig11"."""
     return scene.rpartition("/")[2]
 
 
@@ -141,8 +143,8 @@ def described(scene: StoredScene) -> str:
 def _drawn_runs(scene: StoredScene) -> dict[str, StoredRun]:
     """Return the runs of a scene that have samples, by method.
 
-    The runs that stand for the printed and the corrected model come first, so that they are drawn
-    first.
+    The runs that represent the printed and the corrected model come first, so that their curves are
+    drawn below those of the other runs.
     """
     drawn = {run.method: run for run in scene.sides.values()}
     for method, run in scene.runs.items():
@@ -155,13 +157,13 @@ def _drawn_runs(scene: StoredScene) -> dict[str, StoredRun]:
 
 
 def _paper_page(scene: StoredScene, report: Report, claims: Sequence[Published]) -> PageContent:
-    """Return the page of a scene of the paper: the printed model beside the corrected one.
+    """Return the page of a scene of the paper, which compares the printed and the corrected model.
 
     Parameters
     ----------
-    scene : has a run with angles of both models.
+    scene : the scene. Both models have a run with angles.
     report : the open results file.
-    claims : what the paper publishes about this scene.
+    claims : the paper's numbers and claims about this scene.
     """
     sections = [
         paper_motion(scene, claims),
@@ -179,14 +181,15 @@ def _paper_page(scene: StoredScene, report: Report, claims: Sequence[Published])
 
 
 def paper_answer(scene: StoredScene) -> list[Markup]:
-    """Return what was found of a scene of the paper, as sentences.
+    """Return sentences on the results for a scene of the paper.
 
-    Corrected methods that failed come first, then how well the corrected runs agree, then what the
-    printed equations do: when they depart, break off, or create energy.
+    The first sentences name the corrected methods that failed. The next one says how well the
+    corrected runs agree. The last one says when the printed equations depart from them, and whether
+    they break off or create energy.
 
     Parameters
     ----------
-    scene : has a run with angles of both models.
+    scene : the scene. Both models have a run with angles.
     """
     printed, corrected = scene.sides[PRINTED], scene.sides[CORRECTED]
     sentences = _faults(scene)
@@ -230,8 +233,9 @@ def _paper_facts(scene: StoredScene, claims: Sequence[Published]) -> list[Fact]:
 
     Parameters
     ----------
-    scene : has a run with angles of both models.
-    claims : what the paper publishes about this scene; the first number of them is a fact.
+    scene : the scene. Both models have a run with angles.
+    claims : the paper's numbers and claims about this scene. The first number that the printed
+        model has is a fact.
     """
     printed, corrected = scene.sides[PRINTED], scene.sides[CORRECTED]
     facts = [_result_fact(scene, "Corrected model", "✓ verified")]
@@ -278,19 +282,19 @@ def _paper_facts(scene: StoredScene, claims: Sequence[Published]) -> list[Fact]:
 
 
 def paper_motion(scene: StoredScene, claims: Sequence[Published]) -> Section:
-    """Return the section with the motion of a scene of the paper.
+    """Return the section with the motion of a scene of the paper by both models.
 
-    It has the moving rotor beside the rotor angle and the pitch that differs most, then the other
-    angles, and the rates folded.
+    First come the animation, the rotor angle, and the pitch angle that differs most between the
+    models. The other angles follow. The rates are in a folded part.
 
     Parameters
     ----------
-    scene : has a run with samples of both models.
-    claims : what the paper publishes about this scene; see `paper_plots`.
+    scene : the scene. Both models have a run with samples.
+    claims : the paper's numbers and claims about this scene; see `paper_plots`.
     """
     sides = scene.sides
     axis = draw.whole_time(list(sides.values()))
-    assert axis is not None  # both have samples
+    assert axis is not None  # both runs have samples
     hero, others, rates = paper_plots(scene, claims)
     elements: list[Grid | Fold | Element] = [
         Legend([(CORRECTED, draw.CORRECTED_LOOK), (PRINTED, draw.PRINTED_LOOK)]),
@@ -312,17 +316,18 @@ def paper_plots(
 
     Parameters
     ----------
-    scene : has a run with samples of both models.
-    claims : of this scene; its published extreme rotor angles are marked in the plot of the rotor.
+    scene : the scene. Both models have a run with samples.
+    claims : the paper's numbers and claims about this scene. A published smallest or largest rotor
+        angle is marked in the plot of the rotor angle.
 
     Returns
     -------
     hero : Grid
-        The moving rotor beside the plots of the rotor and of the pitch that differs most.
+        The animation beside two plots: the rotor angle, and the pitch angle that differs most.
     others : list of Plot
-        The other angles.
+        Plots of the other angles.
     rates : list of Plot
-        The rates of all coordinates; empty where a run has none.
+        Plots of all rates; empty if one of the two runs has no rates.
     """
     sides = scene.sides
     printed, corrected = sides[PRINTED], sides[CORRECTED]
@@ -352,7 +357,7 @@ def paper_plots(
             still=is_main,
         )
     moving = viewer(scene, {"as printed": printed, "corrected": corrected})
-    # A single plot where there are no pitches.
+    # If the scene had no pitches, `shown` would be 0, and the rotor angle would be the only plot.
     stack = [plots[k] for k in dict.fromkeys([0, shown])]
     cards: list[list[Element]] = [] if moving is None else [[Viewer(moving, scene.title)]]
     hero = Grid(len(cards) + 1, [*cards, [*stack]])
@@ -366,11 +371,12 @@ def paper_plots(
 
 
 def _own_page(scene: StoredScene, report: Report) -> PageContent:
-    """Return the page of a scene that is not the paper's: motion and loads first.
+    """Return the page of a scene that is not compared with the paper: motion and loads first.
 
     Parameters
     ----------
-    scene : its corrected run is shown, the printed one where there is none.
+    scene : the scene. The motion is that of its corrected run, or of its printed run if there is no
+        corrected one.
     report : the open results file.
     """
     run = scene.corrected or scene.printed
@@ -392,9 +398,9 @@ def _own_page(scene: StoredScene, report: Report) -> PageContent:
 
 
 def _faults(scene: StoredScene) -> list[Markup]:
-    """Return a sentence about each corrected method of the scene whose status is not ok.
+    """Return a sentence about each corrected method of the scene whose run is not ok.
 
-    Where there are more than two, one sentence names all of them.
+    If there are more than two such methods, a single sentence names all of them.
     """
     sentences = []
     for method, run in scene.corrected_runs.items():
@@ -415,12 +421,13 @@ def _faults(scene: StoredScene) -> list[Markup]:
         text += f": {typeset(reason)}." if reason else "."
         error = metric(run, "angle_error_max")
         if run.status == "inaccurate" and error is not None and error <= OK_ERROR:
-            # What was exceeded need not be what the reader is after: the angles.
+            # Another bound was exceeded, such as that of the energy. The sentence adds that the
+            # angles, which most readers need, are accurate.
             text += f" Its angles are within {up_to(error)} rad of the reference"
             compared, whole = compared_time([scene])
             text += f" up to {seconds(compared)}." if compared < whole else "."
         sentences.append(text)
-    # Many failures are named together: the reasons are in the tables.
+    # The reasons of many failures would be too long for the answer. They are in the tables.
     if len(sentences) > 2:
         names = [
             label_of(method)
@@ -433,14 +440,14 @@ def _faults(scene: StoredScene) -> list[Markup]:
 
 
 def own_answer(scene: StoredScene, run: StoredRun | None) -> list[Markup]:
-    """Return what a rotor does, as sentences: turns, speed, pitch, and its largest root moment.
+    """Return sentences on the motion of a rotor: turns, speed, pitch, and largest root moment.
 
-    Methods that failed come first, the agreement of the methods last.
+    The first sentences name the methods that failed. The last one says how well the methods agree.
 
     Parameters
     ----------
-    scene : whose failed methods and agreement are described.
-    run : the run whose motion is described; None where no run has samples.
+    scene : the scene.
+    run : the run whose motion is described; None if no run has samples.
     """
     sentences = _faults(scene)
     if run is None:
@@ -486,9 +493,10 @@ def own_answer(scene: StoredScene, run: StoredRun | None) -> list[Markup]:
 
 
 def _peak(run: StoredRun, name: str) -> tuple[float, int, float] | None:
-    """Return the largest size of a load of the blades, the blade, from 1, and its time (s).
+    """Return the largest magnitude of a blade load, the number of its blade, and its time (s).
 
-    None where the run does not have the load `name`, or no finite value of it.
+    The first blade is 1. None is returned if the run does not have the load `name`, or has no
+    finite value of it.
     """
     if name not in run:
         return None
@@ -501,9 +509,10 @@ def _peak(run: StoredRun, name: str) -> tuple[float, int, float] | None:
 
 
 def _root_moments(run: StoredRun) -> list[Channel]:
-    """Return the channel of the magnitudes of the blade root moments; none where a run lacks them.
+    """Return a list with the channel of the magnitudes of the blade root moments.
 
-    The largest of them is what the page quotes; the other channels of loads are components.
+    The list is empty if the run does not have these moments. The answer and the facts of the page
+    give the largest magnitude, but the channels of loads have only the components of the vectors.
     """
     if "blade_root_moment" not in run:
         return []
@@ -512,13 +521,15 @@ def _root_moments(run: StoredRun) -> list[Channel]:
 
 
 def _result_fact(scene: StoredScene, name: str, good: str) -> Fact:
-    """Return a fact: how many corrected methods are ok, and the other statuses.
+    """Return the fact that says how many corrected methods are ok.
+
+    If a method is not ok, the value of the fact is the statuses that are not ok.
 
     Parameters
     ----------
-    scene : whose runs of corrected models are counted.
-    name : the name of the fact.
-    good : its value where all methods are ok.
+    scene : the scene whose corrected runs are counted.
+    name : name of the fact.
+    good : value of the fact if all methods are ok.
     """
     runs = scene.corrected_runs
     if not runs:
@@ -537,11 +548,11 @@ def _result_fact(scene: StoredScene, name: str, good: str) -> Fact:
 
 
 def _own_facts(scene: StoredScene, run: StoredRun) -> list[Fact]:
-    """Return facts about the motion of a run: rotor speed, largest moments, pitch, compared time.
+    """Return facts about a run: rotor speed, largest moments, pitch, and compared time.
 
     Parameters
     ----------
-    scene : the scene; its reference tells how much of the time was compared.
+    scene : the scene, whose runs were compared with the reference up to the horizon.
     run : the run that is shown.
     """
     facts = []
@@ -581,20 +592,20 @@ def _own_facts(scene: StoredScene, run: StoredRun) -> list[Fact]:
 def motion_channels(
     scene: StoredScene, run: StoredRun, jumps: Jumps
 ) -> tuple[list[Channel], list[Channel]]:
-    """Return the channels of a motion, the main ones apart from the others.
+    """Return the channels of the motion of a run in two lists: main channels, and the others.
 
     Parameters
     ----------
-    scene : of the run.
-    run : has angles, rates, or both.
-    jumps : of the scene's prescribed loads, at which powers are interrupted.
+    scene : scene of the run.
+    run : run with angles, rates, or both.
+    jumps : jumps of the scene's prescribed loads. Curves of power are interrupted there.
 
     Returns
     -------
     main : list of Channel
-        Rotor speed and pitch angles, as far as the run has them.
+        Rotor speed and pitch angles, if the run has them.
     others : list of Channel
-        Powers, rotor angle, and pitch rates.
+        Powers, rotor angle, and pitch rates, if the run has them.
     """
     main, others = [], []
     rotor = coordinate_look(0)
@@ -626,9 +637,10 @@ def _blade_curves(values: Array) -> list[tuple[str, Look, Array]]:
 
 
 def _commands(scene: Scene, time: Array) -> list[Curve]:
-    """Return the pitch commands that change over time, in degrees, each different one once.
+    """Return the curves (degrees) of the pitch commands that change over time.
 
-    A curve has the points of the command's own table within `time` (n,) s.
+    Equal commands of several blades have one curve. The points of a curve are the rows of the
+    command's table within the range of `time`, (n,) s.
     """
     curves = []
     look = Look(GREY, ":", "", "command")
@@ -640,16 +652,19 @@ def _commands(scene: Scene, time: Array) -> list[Curve]:
 
 
 def _powers(scene: Scene, run: StoredRun, jumps: Jumps) -> list[Channel]:
-    """Return the powers of the torque on the rotor, of the shaft damper, and of pitch actuators.
+    """Return the channels of power: torque on the rotor with shaft damper, and pitch actuators.
 
     Parameters
     ----------
-    scene : of the run; an actuator has a curve only where its torque or command changes.
-    run : has rates; without angles the actuators are left out.
-    jumps : of the prescribed loads, at which the curves are interrupted.
+    scene : scene of the run. An actuator has a curve only if its torque or its command changes
+        over time.
+    run : run with rates. If it has no angles, the actuators are left out.
+    jumps : jumps of the prescribed loads. The curves are interrupted there.
     """
     time, rates = run.array("time"), run.array("rates")
-    before = time * (1.0 - 1e-12)  # at a jump the value before it, as stored loads have it
+    # `values_at` returns the value after a jump. Stored loads have the value before it. The loads
+    # are therefore evaluated slightly earlier than the samples.
+    before = time * (1.0 - 1e-12)
     breaks = jumps.breaks(time)
     channels = []
     curves = []
@@ -668,7 +683,8 @@ def _powers(scene: Scene, run: StoredRun, jumps: Jumps) -> list[Channel]:
                 len({value for _, value in table}) > 1 for table in (torque_table, rest_table)
             ):
                 continue
-            # The moment of an actuator: a torque, a spring to the commanded angle, and a damper.
+            # The moment of an actuator is the sum of the pitch torque and the moments of a spring
+            # to the commanded angle and of a damper.
             torque, rest = (values_at(table, before) for table in (torque_table, rest_table))
             stiffness, damping = scene.bearings[i]
             moment = torque + stiffness * (rest - angles[:, 1 + i]) - damping * rates[:, 1 + i]
@@ -691,13 +707,15 @@ def _in_units(
 
 
 def _torque_plot(scene: Scene, run: StoredRun, jumps: Jumps) -> Plot | None:
-    """Return the plot of the torque on the rotor by its own points; None where there is none.
+    """Return the plot of the torque on the rotor; None if no torque acts on it.
+
+    The points of the curve are the rows of the torque's table, not the samples of the run.
 
     Parameters
     ----------
-    scene : whose torque is plotted.
-    run : gives the time axis.
-    jumps : of the prescribed loads, marked by lines.
+    scene : scene with the torque.
+    run : run with the time axis.
+    jumps : jumps of the prescribed loads. Vertical lines mark them.
     """
     if not scene.has_torque:
         return None
@@ -726,11 +744,11 @@ def _motion_section(
 
     Parameters
     ----------
-    scene : of the run.
+    scene : scene of the run.
     run : the run that is shown.
-    jumps : of the prescribed loads; the first plot names them.
-    main : the channels beside the moving rotor.
-    others : the channels below it.
+    jumps : jumps of the prescribed loads. All plots mark them, and the first plot also names them.
+    main : channels that are plotted beside the animation.
+    others : channels that are plotted below the animation.
     """
     time = run.array("time")
     axis = draw.time_axis(time)
@@ -771,7 +789,10 @@ def _motion_section(
 
 
 def _energy_channel(run: StoredRun) -> Channel | None:
-    """Return the channel of kinetic and potential energy and work; None where `run` lacks one."""
+    """Return the channel of kinetic energy, potential energy and work.
+
+    None is returned if the run does not have all three.
+    """
     names = ("kinetic_energy", "potential_energy", "work")
     if not all(name in run for name in names):
         return None
@@ -787,14 +808,18 @@ def _energy_channel(run: StoredRun) -> Channel | None:
 def _loads_section(
     run: StoredRun, jumps: Jumps, loads: Sequence[Channel], energy: Channel | None
 ) -> Section:
-    """Return the section with the loads: three components in a row, then actuators and energy.
+    """Return the section with the loads and energies of a run.
+
+    The components of vectors come first, with x, y and z in a row. The other loads and the energies
+    follow.
 
     Parameters
     ----------
-    run : gives the time axis.
-    jumps : of the prescribed loads, marked in each plot.
-    loads : the channels of the loads; those of vectors have names that end in x, y or z.
-    energy : the channel of the energies; None where the run does not have them.
+    run : run with the time axis.
+    jumps : jumps of the prescribed loads. Each plot marks them.
+    loads : channels of the loads. The name of a channel ends in x, y or z if the channel has a
+        component of vectors.
+    energy : channel of the energies; None if the run does not have them.
     """
     time = run.array("time")
     axis = draw.time_axis(time)
@@ -812,7 +837,7 @@ def _loads_section(
         cards = []
         for channel in vectors:
             is_still = channel.name == "Blade root moment y"
-            # The frame stands above all of them.
+            # The text above the plots names the frame, so that the plots need not.
             channel = channel._replace(note="")
             cards.append([channel.plot(axis, time, marks=jumps.marks(), still=is_still)])
         elements.append(Grid(3, cards))
@@ -837,12 +862,13 @@ def _loads_section(
 
 
 def _extremes_section(run: StoredRun, channels: Sequence[Channel]) -> Section:
-    """Return the table of smallest, largest and mean values and standard deviations of all curves.
+    """Return the section with the extremes, means and standard deviations of all curves.
 
     Parameters
     ----------
-    run : gives the time of each sample, and so of the smallest and the largest value.
-    channels : whose curves are rows; curves without a finite value are left out.
+    run : run with the times of the samples.
+    channels : channels of the run. Each of their curves is a row of the table; curves without a
+        finite value are left out.
     """
     time = run.array("time")
     rows: list[Row] = []
@@ -869,7 +895,7 @@ def _extremes_section(run: StoredRun, channels: Sequence[Channel]) -> Section:
 
 
 def _floored(value: float, floor: float) -> TableCell:
-    """Return a cell with four digits of a value; 0 where its size is at most `floor`."""
+    """Return a cell with four digits of a value; 0 if its magnitude is at most `floor`."""
     shown = 0.0 if abs(value) <= floor else value
     return TableCell(number(shown, 4), order=shown)
 
@@ -878,16 +904,17 @@ def _time_cell(time: float) -> TableCell:
     return TableCell(fixed(time, 2), order=time)
 
 
-# ---- Parts of both
+# ---- Sections of both kinds of pages
 
 
 def _agreement_section(scene: StoredScene, report: Report) -> Section:
-    """Return the section with the table of all runs, and their errors over time.
+    """Return the section with a table of all runs, and plots of their errors over time.
 
     Parameters
     ----------
-    scene : whose runs are compared.
-    report : the open results file; of the stability suite the rows have the outcome of the ladder.
+    scene : the scene whose runs are compared.
+    report : the open results file. If it is of the stability suite, the table has the outcomes of
+        the suite.
     """
     runs = _drawn_runs(scene)
     suite_runs = [run for run in report.suite_runs if run.scene == scene.name]
@@ -950,7 +977,10 @@ _UNCERTAINTY = Look(GREY, ":", "", "uncertainty of the reference")
 
 
 def _uncertainty(scene: StoredScene) -> list[Curve]:
-    """Return the curve of the reference's uncertainty; none where it is too small to be drawn."""
+    """Return a list with the curve of the reference's uncertainty, rad.
+
+    The list is empty if the uncertainty is unknown or too small to be drawn.
+    """
     reference = scene.reference
     if reference is None or "angle_uncertainty" not in reference:
         return []
@@ -961,11 +991,11 @@ def _uncertainty(scene: StoredScene) -> list[Curve]:
 
 
 def _details_section(scene: StoredScene) -> Section:
-    """Return the folded section: interval defects, joints, every number, the scene's file.
+    """Return the section of folded details: interval defects, joints, all metrics, scene file.
 
     Parameters
     ----------
-    scene : whose runs and file are shown.
+    scene : the scene whose runs and file are shown.
     """
     runs = {name: run for name, run in _drawn_runs(scene).items() if name != REFERENCE}
     folds: list[Grid | Fold | Element] = []
