@@ -1,4 +1,4 @@
-"""Error and run time: its page, and its diagram on other pages."""
+"""Build the page of error and run time, and the work-precision diagrams of a scene."""
 
 from __future__ import annotations
 
@@ -41,13 +41,15 @@ from rotor_mbs.solution.status import COMPLETE
 from rotor_mbs.studies.stability import SuiteRun, suite_runs
 
 _POINT_COLUMNS = ("angle_error_max", "defect_max", "energy_drift_max", "run_time_s", "steps")
-_MAX_POINTS = 800  # in a page's tables; where there are more, only those not ok
+# Largest number of points in the tables of a page. If a bench has more points, the tables have only
+# those that are not ok.
+_MAX_POINTS = 800
 _ERRORS = {
     work_precision.ANGLE_ERROR: "Largest angle error",
     "defect_max": "Largest interval defect",
 }
-_ENGINE_TARGETS = (1e-6, 1e-9, 1e-10)  # rad
-_LONG_S = 100.0  # shortest run whose energy drift is shown
+_ENGINE_TARGETS = (1e-6, 1e-9, 1e-10)  # errors in rad for which each method's run time is given
+_LONG_S = 100.0  # s, shortest duration of a scene whose energy drift is shown
 _NO_ENGINE = (
     "rotor_mbs",
     "python",
@@ -55,26 +57,27 @@ _NO_ENGINE = (
     "h5py",
     "code",
     "plug-in",
-)  # versions that are not those of an engine
-# what differs from the colours of the catalogue's models, and from each other, light and dark
+)  # names of stored versions that are not versions of an engine
+# Colours for methods of files. On light and on dark pages they differ from each other, and from the
+# colours of the models in the catalogue.
 _COLOURS_OF_FILES = tuple(
     PALETTE[name][0] for name in ("rotor", "blade-4", "step-6", "blade-3", "blade-5", "step-3")
 )
 _FRONT = Look(PALETTE["ring"][0], "-", "", "best of all methods")
-_LOWEST_ERROR = 2e-16  # rad: smaller ones are drawn there, inside the frame
-_SCENES_IN_A_TABLE = 6  # beside the method
-_NAMES_IN_A_SENTENCE = 4
+_LOWEST_ERROR = 2e-16  # rad; smaller errors are drawn at this value, inside the frame
+_SCENES_IN_A_TABLE = 6  # largest number of columns beside that of the methods
+_NAMES_IN_A_SENTENCE = 4  # largest number of methods whose names a sentence has
 
 
 def bench_page(results: OpenResults) -> PageContent:
     """Return the content of the page of error against run time.
 
-    It has the diagram of the first scene, what each method reaches on all scenes, and every
-    setting.
+    The page has the diagrams of the first scene, with those of other scenes folded. Tables of the
+    results of each method, and of every setting, follow.
 
     Parameters
     ----------
-    results : the open results file; it has curves of the bench.
+    results : the open results file, with curves of a bench.
     """
     grouped = work_precision.by_scene(read_records(results.path, "bench"))
     scenes = {name: grouped[name] for name in natural_order(grouped)}
@@ -94,7 +97,7 @@ def bench_page(results: OpenResults) -> PageContent:
         elements += others
     sections.append(Section("diagram", f"Error against run time: {first}", elements, _LOWER_LEFT))
     if len(scenes) == 1:
-        # The table of all scenes would have one column of it.
+        # The table of all scenes would have only one column. The table of the scene shows more.
         sections.append(Section("reach", "Time to an error", [_reach_table(scenes[first])]))
     else:
         sections.append(_reach_section(scenes))
@@ -123,7 +126,9 @@ _LOWER_LEFT = (
 
 
 def bench_answer(scenes: Mapping[str, Sequence[Record]]) -> list[Markup]:
-    """Return which method is the fastest to an error, and how much slower another model is.
+    """Return sentences on the fastest method to an error, and on the fastest one of another model.
+
+    A last sentence names the methods that never reach 1e-6 rad, if they are few.
 
     Parameters
     ----------
@@ -142,7 +147,8 @@ def bench_answer(scenes: Mapping[str, Sequence[Record]]) -> list[Markup]:
             reached += 1
             winner = ranked[0][0].method
             wins[winner] += 1
-            # The fastest method of another model: methods of one model share code.
+            # The winner is compared with a method of another model, because methods of the same
+            # model share code.
             other = next(
                 (pair for pair in ranked if _model(pair[0].method) != _model(winner)), None
             )
@@ -155,7 +161,7 @@ def bench_answer(scenes: Mapping[str, Sequence[Record]]) -> list[Markup]:
         where = "" if len(scenes) == 1 else f" on {count} of {reached} scenes"
         second, factor = "", ""
         if ratios:
-            # The method that most often is the fastest of the other models.
+            # `second` is the method that is the fastest one of another model on most scenes.
             second = max(ratios, key=lambda method: len(ratios[method]))
             factor = number(float(np.median(ratios[second])))
         found.setdefault((winner, where, second), []).append((target, factor))
@@ -186,7 +192,8 @@ def bench_answer(scenes: Mapping[str, Sequence[Record]]) -> list[Markup]:
 def _never_reaching(scenes: Mapping[str, Sequence[Record]], target: float) -> list[str]:
     """Return the labels of the methods that reach an error on no scene.
 
-    A method of which settings were left out is not among them: these might reach it.
+    A method is not returned if some of its settings were left out, because these settings might
+    reach the error.
 
     Parameters
     ----------
@@ -208,7 +215,7 @@ def _model(method: str) -> str:
 
 
 def _facts(scenes: Mapping[str, Sequence[Record]]) -> list[Fact]:
-    """Return the facts at the top of the page: how many scenes, methods, and settings there are.
+    """Return the facts at the top of the page: numbers of scenes, methods and settings.
 
     Parameters
     ----------
@@ -246,12 +253,12 @@ def _winner(curves: Sequence[Record]) -> str:
 
 
 def _conditions(name: str, curves: Sequence[Record]) -> str:
-    """Return a text about how a scene's points were measured.
+    """Return a text on how the points of a scene were measured.
 
     Parameters
     ----------
-    name : of the scene.
-    curves : of the scene, whose attributes tell the conditions.
+    name : name of the scene.
+    curves : curves of the scene. Their attributes have the conditions of the measurement.
     """
     facts = curves[0].attributes
     if facts["horizon_s"] < facts["duration_s"]:
@@ -281,10 +288,10 @@ def _conditions(name: str, curves: Sequence[Record]) -> str:
 
 
 def curve_looks(curves: Sequence[Record]) -> dict[str, Look]:
-    """Return a look for each curve by its name.
+    """Return the look of each curve by the name of the curve.
 
-    Methods of files, which would all be grey, have a colour for each file, and a line for each
-    method of it.
+    Curves that are not in the catalogue would all be grey. Each file of methods therefore gets a
+    colour, and each method of a file a line style.
     """
     looks = {curve.name: look_of(curve.name) for curve in curves}
     unknown: dict[str, list[str]] = {}
@@ -300,12 +307,13 @@ def curve_looks(curves: Sequence[Record]) -> dict[str, Look]:
 def diagrams(curves: Sequence[Record], group: str = "") -> list[Legend | Grid]:
     """Return the legend and the work-precision diagrams of a scene.
 
-    One diagram is over angle error, one over interval defect; without points there are none.
+    One diagram has the angle error over the run time, the other the interval defect. The list is
+    empty if neither has a point.
 
     Parameters
     ----------
-    curves : of the scene.
-    group : before the keys of the curves, where a page has several groups of diagrams.
+    curves : curves of the scene.
+    group : prefix of the keys of the curves, which separates groups of diagrams on a page.
     """
     looks = curve_looks(curves)
     plots = []
@@ -323,17 +331,17 @@ def diagrams(curves: Sequence[Record], group: str = "") -> list[Legend | Grid]:
 def diagram(
     curves: Sequence[Record], error: str, name: str, looks: Mapping[str, Look], group: str = ""
 ) -> Plot | None:
-    """Return the work-precision diagram of a scene; None where it has no point.
+    """Return a work-precision diagram of a scene; None if it has no point.
 
     The Pareto front of all curves is drawn behind them.
 
     Parameters
     ----------
-    curves : of the scene.
-    error : column of the error, rad.
-    name : of the error, the title of the plot.
-    looks : of the curves, by name.
-    group : before the keys of the curves.
+    curves : curves of the scene.
+    error : name of the column with the error, rad.
+    name : name of the error, which is the title of the plot.
+    looks : look of each curve by the name of the curve.
+    group : prefix of the keys of the curves. A diagram with a group has no still picture.
     """
     points = {
         curve.name: work_precision.points(curve, error) for curve in curves if error in curve.arrays
@@ -344,7 +352,7 @@ def diagram(
     errors, seconds = np.concatenate(list(drawn.values()), axis=1)
     front = work_precision.pareto(errors, seconds)
     plotted = []
-    # The front comes first, so that the curves are drawn upon it.
+    # The front comes first, so that the curves are drawn over it.
     if len(front) > 1:
         order = front[np.argsort(seconds[front])]
         plotted.append(
@@ -359,7 +367,8 @@ def diagram(
     low, high = float(seconds.min()), float(seconds.max())
     axis = Horizontal("run time", "s", "time", 0.8 * low, max(1.25 * high, 1.0001 * low), log=True)
     marks = []
-    # In quad precision it is far below all errors.
+    # The uncertainty is marked only if it is larger than the smallest error. That of a reference in
+    # quad precision is far below all errors.
     uncertainty = max(
         (float(curve.attributes.get("uncertainty_rad", 0.0)) for curve in curves), default=0.0
     )
@@ -373,11 +382,12 @@ def diagram(
 
 
 def _reach_table(curves: Sequence[Record]) -> PageTable:
-    """Return the table of run times to reach an error, a row per curve that was measured.
+    """Return the table of the run times that the curves of a scene need to reach an error.
 
     Parameters
     ----------
-    curves : of one scene; those that were not measured share the last row.
+    curves : curves of the scene. Each curve has a row, but those that were not measured share the
+        last one.
     """
     table = bench_table(curves)
     rows: list[Row] = []
@@ -397,9 +407,10 @@ def _reach_table(curves: Sequence[Record]) -> PageTable:
 
 
 def _reach_section(scenes: Mapping[str, Sequence[Record]]) -> Section:
-    """Return which method reaches 1e-6 rad on which scene, and how much slower than the fastest.
+    """Return the section with the run time of each method to reach 1e-6 rad on each scene.
 
-    Methods are rows and scenes columns, in as many tables as fit a page.
+    The tables have a row for each method and a column for each scene. There are several tables if
+    the scenes do not fit the width of a page.
 
     Parameters
     ----------
@@ -428,12 +439,14 @@ def _scene_cell(
     curves: Sequence[Record],
     ranked: Sequence[tuple[Record, work_precision.Reach]],
 ) -> TableCell | str:
-    """Return whether a method reaches an error on a scene, as a cell; "" for one not tried there.
+    """Return a cell that says whether a method reaches an error on a scene.
+
+    The cell is "" if the method was not run on the scene.
 
     Parameters
     ----------
-    method : the method.
-    curves : of the scene, by all methods.
+    method : name of the method.
+    curves : curves of all methods on the scene.
     ranked : the curves that reach the error, the fastest first; see `work_precision.fastest`.
     """
     own = [curve for curve in curves if curve.method == method]
@@ -450,7 +463,9 @@ def _scene_cell(
 
 
 def _methods_section(results: OpenResults, scenes: Mapping[str, Sequence[Record]]) -> Section:
-    """Return the section with a fold per method, whose heading summarizes its results.
+    """Return the section with a folded list of results for each method.
+
+    The heading of a folded list summarizes the results.
 
     Parameters
     ----------
@@ -503,11 +518,12 @@ _EXPLAINED = (
 def engine_tables(results: OpenResults, scenes: Mapping[str, Sequence[Record]]) -> list[PageTable]:
     """Return two tables with a row per method: accuracy and cost over all scenes, and capabilities.
 
-    What the file does not know is a dash.
+    Values that are unknown are dashes.
 
     Parameters
     ----------
-    results : the open results file; its scenes tell damping and loads, its runs the energy drift.
+    results : the open results file. Its scenes determine which curves have damping and loads over
+        time. Its runs have the energy drift.
     scenes : the curves of the bench, by scene.
     """
     curves = [curve for of_scene in scenes.values() for curve in of_scene]
@@ -515,7 +531,7 @@ def engine_tables(results: OpenResults, scenes: Mapping[str, Sequence[Record]]) 
     suite = [
         run for run in suite_runs(results.path) if run.scene.startswith(("stiff/", "extreme/"))
     ]
-    # The energy drift is that of the shortest scene that is long enough.
+    # The energy drift is shown for the shortest scene that lasts at least _LONG_S.
     durations = {
         name: scene.duration for name, scene in parsed.items() if results.scenes[name].methods
     }
@@ -532,7 +548,7 @@ def engine_tables(results: OpenResults, scenes: Mapping[str, Sequence[Record]]) 
             for name, of_scene in scenes.items()
         }
         own = {name: of_scene for name, of_scene in own.items() if of_scene}
-        # A scene counts as ok where at least one setting is.
+        # A method is ok on a scene if at least one of its settings is ok.
         with_ok = [curves for curves in own.values() if any("ok" in c.statuses for c in curves)]
         reached.append(
             [
@@ -604,15 +620,15 @@ def engine_tables(results: OpenResults, scenes: Mapping[str, Sequence[Record]]) 
 
 
 def _worst_cell(own: Mapping[str, Sequence[Record]], column: str) -> TableCell | str:
-    """Return the best value of a method on the scene where it does worst.
+    """Return a cell with the largest of a method's smallest errors.
 
-    The note names that scene, and on how many scenes the method has no value though it was
-    measured.
+    The smallest error is taken over the settings of each scene, the largest over the scenes. The
+    note has the scene, and the number of scenes on which all settings failed.
 
     Parameters
     ----------
     own : the curves of the method, by scene.
-    column : the error.
+    column : name of the column with the error.
     """
     values = {name: work_precision.values_of(curves, column) for name, curves in own.items()}
     known = {name: min(of_scene) for name, of_scene in values.items() if of_scene}
@@ -621,7 +637,7 @@ def _worst_cell(own: Mapping[str, Sequence[Record]], column: str) -> TableCell |
         return (
             (TableCell("not measured") if is_cut else TableCell("none", "bad")) if own else NOTHING
         )
-    # The value is an upper bound where finer settings were left out there.
+    # If finer settings were left out on this scene, the value is an upper bound.
     worst = max(known, key=lambda name: known[name])
     is_bound = known[worst] > 0.0 and any(map(work_precision.left_out, own[worst]))
     bound = "≤ " if is_bound else ""
@@ -637,15 +653,19 @@ def _worst_cell(own: Mapping[str, Sequence[Record]], column: str) -> TableCell |
 def _reach_cell(
     scenes: Mapping[str, Sequence[Record]], own: Mapping[str, Sequence[Record]], target: float
 ) -> TableCell:
-    """Return on how many scenes a method reaches an error, and how much slower than the fastest.
+    """Return a cell with the number of scenes on which a method reaches an error.
+
+    The cell also has the run time relative to that of the fastest method, as a median over these
+    scenes.
 
     Parameters
     ----------
-    scenes, own : the curves of all methods, and those of this one, by scene.
+    scenes : the curves of all methods, by scene.
+    own : the curves of the method, by scene.
     target : the error, rad.
     """
     reached: dict[str, work_precision.Reach] = {}
-    cut = 0  # scenes on which the settings that may reach it were left out
+    cut = 0  # number of scenes on which the error might be reached by settings that were left out
     for name, curves in own.items():
         ranked = work_precision.fastest(scenes[name], target)
         reach = next(
@@ -667,9 +687,13 @@ def _reach_cell(
 
 
 def _order_cell(curves: Sequence[Record]) -> str:
-    """Return the order fitted to a method with a fixed step, and its nominal order.
+    """Return a text with the measured and the nominal order of a method with a fixed step.
 
-    A method without a nominal order is adaptive. curves : of the method, on all scenes.
+    The text is "adaptive" for a method without a nominal order.
+
+    Parameters
+    ----------
+    curves : curves of the method on all scenes.
     """
     claimed = [
         curve.attributes["order_expected"]
@@ -695,7 +719,14 @@ def _drift_cell(run: StoredRun | None) -> TableCell | str:
 
 
 def _zero_pitch_cell(own: Mapping[str, Sequence[Record]]) -> TableCell | str:
-    """Return whether pitches that are zero in the reference are zero at every setting."""
+    """Return a cell that says whether pitch angles remain zero that are zero in the reference.
+
+    They must remain zero at every setting.
+
+    Parameters
+    ----------
+    own : the curves of the method, by scene.
+    """
     known = work_precision.values_of(
         (curve for curves in own.values() for curve in curves), "zero_pitch_max"
     )
@@ -711,15 +742,16 @@ def _zero_pitch_cell(own: Mapping[str, Sequence[Record]]) -> TableCell | str:
 def _false_success_cell(
     own: Mapping[str, Sequence[Record]], suite: Sequence[SuiteRun]
 ) -> TableCell | str:
-    """Return how often an engine reported success for a wrong result.
+    """Return a cell with the number of wrong results for which an engine reported success.
 
     Parameters
     ----------
     own : the curves of the method, by scene.
-    suite : its runs of the stability suite; without any the settings in `own` are counted.
+    suite : runs of the method in the stability suite. If there are none, the failed settings of
+        the curves are counted.
     """
     if suite:
-        # A run that the time limit ended is neither right nor wrong.
+        # A run that the time limit ended is neither correct nor wrong.
         finished = [run for run in suite if run.status != "timed_out"]
         wrong = [run for run in finished if run.status not in ("ok", "unchecked")]
         claimed, count, late = (
@@ -742,14 +774,14 @@ def _false_success_cell(
 
 
 def point_table(curves: Sequence[Record], *, only_faults: bool = False) -> PageTable:
-    """Return the table of settings, a row per setting that was run.
+    """Return a table with a row for each setting that was run.
 
     The settings of a curve that the time budget left out share a row.
 
     Parameters
     ----------
-    curves : of one scene.
-    only_faults : whether settings that are ok or left out are omitted.
+    curves : curves of one scene.
+    only_faults : whether the table omits settings that are ok or were left out.
     """
     columns = {
         name: COLUMNS[name]

@@ -1,7 +1,7 @@
-"""Build the index of a file with several scenes: what was found, then every scene in a row.
+"""Build the index of a file with several scenes: the results, and a table with a row per scene.
 
-For scenes of the paper it has the finding about the paper; for a user's own scenes it has how they
-ended, those that failed first.
+The index of scenes of the paper has the findings about the paper. The index of a user's own scenes
+has the statuses of their runs, with the failed scenes first.
 """
 
 from __future__ import annotations
@@ -59,11 +59,14 @@ from rotor_mbs.runs.read import StoredRun, StoredScene
 from rotor_mbs.scenario.keys import counted
 from rotor_mbs.solution.status import GOOD
 
-_NAMED = 5  # scenes in a sentence
+_NAMED = 5  # largest number of scenes whose names a sentence has
 
 
 def index_page(report: Report) -> PageContent:
-    """Return the content of the index: of the paper where there are claims, else of own scenes."""
+    """Return the content of the index of a results file.
+
+    The index is that of the paper if the file has scenes with claims, else that of own scenes.
+    """
     return _paper_index(report) if report.claims else _own_index(report)
 
 
@@ -73,7 +76,7 @@ def index_page(report: Report) -> PageContent:
 def created_energy(scene: StoredScene) -> float | None:
     """Return the energy (J) that the printed equations create in a scene.
 
-    None where it is below a thousandth of the energy scale, or not known.
+    None is returned if the energy is unknown, or at most a thousandth of the energy scale.
     """
     run = scene.printed
     if run is None:
@@ -83,7 +86,7 @@ def created_energy(scene: StoredScene) -> float | None:
 
 
 def paper_answer(report: Report) -> list[Markup]:
-    """Return what was found of the paper, from the file's runs, as sentences.
+    """Return sentences on the findings about the paper, with numbers from the runs of the file.
 
     Parameters
     ----------
@@ -140,7 +143,7 @@ def _paper_index(report: Report) -> PageContent:
 
 
 def _paper_facts(report: Report) -> list[Fact]:
-    """Return the facts at the top of the paper's index: errors, energy, disagreement, numbers.
+    """Return the facts about the paper: errors, created energy, disagreement, published numbers.
 
     Parameters
     ----------
@@ -199,10 +202,11 @@ def _paper_facts(report: Report) -> list[Fact]:
 
 
 def _hero_scene(report: Report) -> StoredScene | None:
-    """Return the scene whose plot shows the finding; None where no scene has both models.
+    """Return the scene whose plots are shown at the top; None if no scene has both models.
 
-    It is the one with a published number that is not amplified rounding error, else the first with
-    angles of both models.
+    Only scenes with angles of both models are considered. The scene of the first published number
+    that is not an amplified rounding error is returned. If there is none, the first scene is
+    returned.
 
     Parameters
     ----------
@@ -220,11 +224,11 @@ def _hero_scene(report: Report) -> StoredScene | None:
 
 
 def _hero_section(scene: StoredScene, report: Report) -> Section:
-    """Return the section with the plot that shows the finding.
+    """Return the section with the plots that compare both models in one scene.
 
     Parameters
     ----------
-    scene : has angles of both models.
+    scene : the scene. Both models have a run with angles.
     report : the open results file, with the claims about the scene and the file of its page.
     """
     claims = [claim for claim in report.claims if scene.name in claim.scenes]
@@ -232,7 +236,8 @@ def _hero_section(scene: StoredScene, report: Report) -> Section:
     printed, corrected = scene.sides[PRINTED], scene.sides[CORRECTED]
     link = Markup('<a href="{}">More on this scene</a>').format(report.files[scene.name])
     say = Markup("{}. ").format(typeset_title(scene.title))
-    # With a published number that the printed equations reproduce the line is more specific.
+    # If the printed equations reproduce a published number, the text names it in place of the
+    # scene's title.
     for claim in claims:
         if claim.is_number and claim.printed is not None and rounds_to(claim.printed, claim):
             ends = [float(run.array("angles")[-1, 0]) for run in (printed, corrected)]
@@ -252,14 +257,17 @@ def _hero_section(scene: StoredScene, report: Report) -> Section:
 
 
 def scene_table(report: Report) -> PageTable:
-    """Return the table of the paper's scenes: departure of the printed model, and agreement.
+    """Return the table of the paper's scenes.
+
+    Its columns have the departure of the printed model from the corrected one, the energy that the
+    printed model creates, and the agreement of the corrected methods.
 
     Parameters
     ----------
     report : the open results file.
     """
     rows: list[Row] = []
-    # A scene in which fewer methods than in others agree has a note.
+    # A scene in which fewer methods agree than in another scene has a note with their number.
     most = max((len(agreement(scene)[0]) for scene in report.scenes.values()), default=0)
     for name, scene in report.scenes.items():
         note = typeset_title(scene.title)
@@ -289,11 +297,11 @@ def scene_table(report: Report) -> PageTable:
 
 
 def _departure_cells(scene: StoredScene) -> list[TableCell | str]:
-    """Return the cells about the printed model: a drawing, when it departs, the energy it creates.
+    """Return the cells about the printed model: drawing, time of departure, created energy.
 
     Parameters
     ----------
-    scene : one row of the table; without angles of both models the cells are empty.
+    scene : scene of the row. If a model has no angles, the cells are empty.
     """
     sides = scene.sides
     if len(sides) < 2 or not all("angles" in run for run in sides.values()):
@@ -302,7 +310,8 @@ def _departure_cells(scene: StoredScene) -> list[TableCell | str]:
     coordinate = draw.differing_coordinate(printed, corrected)
     right = corrected.array("angles")[:, coordinate]
     low, high = float(right.min()), float(right.max())
-    # The range of the corrected model; the printed one is cut off where it leaves this by far.
+    # The drawing has the range of the corrected model and some room on both sides. The curve of the
+    # printed model is cut off beyond it.
     room = max(0.6 * (high - low), 0.2)
     picture = draw.spark(
         [
@@ -336,7 +345,9 @@ def _departure_cells(scene: StoredScene) -> list[TableCell | str]:
 
 
 def _errata_section(report: Report) -> Section:
-    """Return the table of the errors with their places, and the effect of each alone.
+    """Return the section with a table of the errata: places, formulas, and effects.
+
+    The effect of an erratum is that of the corrected equations with this erratum alone.
 
     Parameters
     ----------
@@ -374,13 +385,13 @@ def _errata_section(report: Report) -> Section:
 
 
 def _printed_and_right(printed: str, right: str) -> Markup:
-    """Return what an erratum prints and what is right, in two lines."""
+    """Return two lines of HTML: the printed formula of an erratum, and the correct formula."""
     lines = Markup('<span class="formula">{}</span><small>right: {}</small>')
     return lines.format(formula(printed, in_prose=True), formula(right, in_prose=True))
 
 
 def _published_section(report: Report) -> Section:
-    """Return the published numbers beside the counts of the claims.
+    """Return the section with a table of published numbers, and the counts of the claims.
 
     Parameters
     ----------
@@ -403,7 +414,7 @@ def _published_section(report: Report) -> Section:
 
 
 def _methods_section(report: Report) -> Section:
-    """Return the table of corrected methods, with the largest errors over all scenes.
+    """Return the section with a table of corrected methods and their largest errors in all scenes.
 
     Parameters
     ----------
@@ -514,7 +525,7 @@ def _is_or_are(count: int) -> str:
 
 
 def _is_bad(scene: StoredScene) -> bool:
-    """Return whether a run of a corrected model is not ok."""
+    """Return whether some run of a corrected model in the scene is not ok."""
     return any(run.status not in GOOD for run in scene.runs.values() if is_corrected(run.method))
 
 
@@ -529,7 +540,11 @@ def _largest_moment(scenes: Sequence[StoredScene]) -> tuple[float, str] | None:
 
 
 def _status_cell(scene: StoredScene) -> TableCell:
-    """Return how the runs of a scene ended: the statuses of failed runs, else how many are ok."""
+    """Return a cell with the statuses of a scene's failed runs.
+
+    If no run failed, the cell has the number of corrected runs, which are all ok. If there is no
+    corrected run, the cell has the statuses of the other runs.
+    """
     bad = [run for run in scene.methods.values() if run.status not in GOOD]
     if bad:
         notes = "; ".join(f"{run.method}: {run.attributes.get('message', '')}" for run in bad)
@@ -538,18 +553,18 @@ def _status_cell(scene: StoredScene) -> TableCell:
     good = len(scene.corrected_runs)
     if good:
         return TableCell(f"✓ {good} of {good}", "good", order=good)
-    # Runs of the printed equations, and a reference alone, were not checked.
+    # Runs of the printed equations and the reference are not checked and do not count as ok.
     ended = ", ".join(dict.fromkeys(map(status_text, scene.methods.values())))
     return TableCell(ended or "reference only", order=0)
 
 
 def own_table(report: Report, scenes: Sequence[StoredScene]) -> PageTable:
-    """Return the table of a user's scenes: speed, status, largest load, and agreement.
+    """Return the table of a user's scenes: rotor speed, status, largest load, and agreement.
 
     Parameters
     ----------
     report : the open results file.
-    scenes : the rows, in order.
+    scenes : scenes in the order of the rows.
     """
     rows: list[Row] = []
     for scene in scenes:

@@ -357,7 +357,7 @@ def paper_plots(
             still=is_main,
         )
     moving = viewer(scene, {"as printed": printed, "corrected": corrected})
-    # If the scene had no pitches, `shown` would be 0, and the rotor angle would be the only plot.
+    # `shown` is 0 if there are no pitches. The rotor angle is then the only plot.
     stack = [plots[k] for k in dict.fromkeys([0, shown])]
     cards: list[list[Element]] = [] if moving is None else [[Viewer(moving, scene.title)]]
     hero = Grid(len(cards) + 1, [*cards, [*stack]])

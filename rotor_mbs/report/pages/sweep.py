@@ -1,7 +1,8 @@
-"""Build the page of a sweep from its dataset alone.
+"""Build the page of a sweep from its results file.
 
-It shows how the runs ended, a map of a quantity over two parameters beside the curves of a chosen
-run, quantities over each parameter, and the runs that are not ok with their reasons.
+The page shows the statuses of the runs, a map of a quantity over two parameters, the curves of a
+run that the reader chooses, quantities over each parameter, and the runs that are not ok with the
+reasons.
 """
 
 from __future__ import annotations
@@ -49,16 +50,21 @@ from rotor_mbs.solution.quantities import LOADS
 from rotor_mbs.solution.status import GOOD, STATUSES
 
 _COUNTS = ("steps", "rhs_evaluations", "time_reached")  # columns that do not describe the motion
-_MAX_ROWS = 500  # of the table of all runs
-_MAX_CELLS = 24  # in each direction of a map
-# A parameter decides if it explains more than this share of the variance of a quantity.
+_MAX_ROWS = 500  # largest number of rows in the table of all runs
+_MAX_CELLS = 24  # largest number of cells in each direction of a map
+# The page says that a parameter decides a quantity if the parameter explains more than this share
+# of the quantity's variance.
 _DECIDES = 0.6
 _COORDINATE = re.compile(r"initial\.(angles|rates)\[(\d+)\]")
 
 
 @dataclass(frozen=True)
 class RunQuantity:
-    """A number of each run: its name, unit and values (runs,)."""
+    """A quantity with one number per run.
+
+    name, unit : name and unit of the quantity.
+    values : (runs,) the numbers, in this unit.
+    """
 
     name: str
     unit: str
@@ -66,15 +72,21 @@ class RunQuantity:
 
     @property
     def title(self) -> str:
-        """Return the name with the unit in brackets, where it has one."""
+        """Return the name of the quantity, with the unit in brackets if it has one."""
         return f"{self.name} ({self.unit})" if self.unit else self.name
 
 
 class _Sweep:
     """A stored sweep with the columns that several parts of its page need.
 
-    statuses, numbers, codes : (runs,) status, number and method of each run.
-    keys, parameters : names of the varied parameters, and their values (runs,) by name.
+    Functions of this module refer to a run by its index, its place in these columns.
+
+    stored : the open file of the sweep.
+    statuses : (runs,) code of each run's status; negative if the run was not computed.
+    numbers : (runs,) number of each run.
+    keys : names of the parameters of the sweep.
+    parameters : values of each parameter by its name, (runs,).
+    codes : (runs,) index of each run's method in `stored.methods`.
     """
 
     def __init__(self, stored: StoredSweep) -> None:
@@ -93,27 +105,27 @@ class _Sweep:
         return "" if unit == "1" else unit
 
     def axis_name(self, key: str) -> str:
-        """Return a parameter in words with its unit."""
+        """Return the name of a parameter in words, with its unit in brackets if it has one."""
         unit = self.unit(key)
         return f"{field_name(key)} ({unit})" if unit else field_name(key)
 
     def status_of(self, run: int) -> str:
-        """Return the status of a run in words; "missing" for one that was not computed."""
+        """Return the status of a run in words; "missing" if the run was not computed."""
         code = int(self.statuses[run])
         return words_of(STATUSES[code]) if code >= 0 else "missing"
 
     @cached_property
     def is_good(self) -> NDArray[np.bool_]:
-        """Return which runs need no attention: (runs,)."""
+        """Return whether each run needs no attention, (runs,): its status is ok or completed."""
         return np.isin(
             self.statuses, [code for code, status in enumerate(STATUSES) if status in GOOD]
         )
 
     @cached_property
     def good_words(self) -> str:
-        """Return the words for runs that need no attention, "ok" or "completed" or both.
+        """Return the statuses of good runs in words: "ok", "completed", or "ok or completed".
 
-        Runs of the printed equations are completed: nothing is claimed of them.
+        A good run of the printed equations is "completed", because their accuracy is not judged.
         """
         present = [STATUSES[code] for code in np.unique(self.statuses[self.is_good]).tolist()]
         return " or ".join(present) or "ok"
@@ -129,7 +141,11 @@ class _Sweep:
 
     @cached_property
     def grid_keys(self) -> list[str]:
-        """Return the parameters of a grid, slowest first; none where the runs are no grid."""
+        """Return the parameters of a grid that have more than one value.
+
+        The parameter that changes slowest from run to run is the first. The list is empty if the
+        runs are not a grid.
+        """
         return self.varied if len(self.stored.shape) == len(self.keys) else []
 
     def value(self, key: str, value: float) -> str:
@@ -137,7 +153,7 @@ class _Sweep:
         return f"{field_name(key)} {brief(value)} {self.unit(key)}".rstrip()
 
     def described(self, run: int) -> str:
-        """Return the values of a run's parameters in words."""
+        """Return the parameters of a run with their values, and its method if there are several."""
         parts = [self.value(key, self.parameters[key][run]) for key in self.varied]
         if len(self.stored.methods) > 1:
             parts.append(self.stored.methods[int(self.codes[run])])
@@ -149,7 +165,8 @@ def sweep_page(stored: StoredSweep) -> PageContent:
 
     Parameters
     ----------
-    stored : the sweep's file. Maps and curves are of its first method alone.
+    stored : the open file of the sweep. The map and all curves have only the runs of its first
+        method.
     """
     sweep = _Sweep(stored)
     quantities = run_quantities(sweep)
@@ -189,7 +206,8 @@ def sweep_page(stored: StoredSweep) -> PageContent:
                 say,
             )
         )
-    is_shown = map_element is not None or bool(curves)  # so that a run can be chosen
+    # The reader can choose a run only if the page has a map or curves.
+    is_shown = map_element is not None or bool(curves)
     sections.append(_over_parameters(sweep, quantities, first_method))
     sections.append(_faults_section(sweep, with_links=is_shown))
     sections.append(_runs_section(sweep, quantities, with_links=is_shown))
@@ -220,7 +238,7 @@ def _json_number(value: float) -> float | None:
 
 
 def brief(value: float) -> str:
-    """Return a parameter's value in at most four digits."""
+    """Return a parameter's value as text with at most four digits."""
     return shortest(float(f"{value:.4g}"))
 
 
@@ -239,10 +257,10 @@ def field_name(key: str) -> str:
 
 
 def run_quantities(sweep: _Sweep) -> list[RunQuantity]:
-    """Return the numbers of each run that differ from run to run.
+    """Return the quantities that differ from run to run, the most important first.
 
-    First the range of the pitch angles, then loads, rotor speed, and the stored metrics. Runs that
-    are not computed have NaN.
+    The first quantity is the range of a pitch angle. Loads, rotor speed and stored metrics follow.
+    The value of a run that was not computed is NaN.
 
     Parameters
     ----------
@@ -291,40 +309,53 @@ def run_quantities(sweep: _Sweep) -> list[RunQuantity]:
             column = stored.columns[name]
             unit = "" if column.units == "1" else column.units
             numbers = values.astype(float)
-            if name == "pitch_max":  # as pitch angles are shown everywhere
+            if name == "pitch_max":  # the page shows all pitch angles in degrees
                 numbers, unit = np.degrees(numbers), "degrees"
             found.append(RunQuantity(column.long_name.partition("; ")[0], unit, numbers))
     shown = []
     for quantity in found:
         values = np.where(complete, quantity.values, np.nan)
         known = values[np.isfinite(values)]
-        # A quantity whose range is rounding error is left out.
+        # If the range of a quantity is rounding error, the quantity is left out.
         if len(known) > 1 and float(np.ptp(known)) > 1e-9 * float(np.abs(known).max()):
             shown.append(RunQuantity(quantity.name, quantity.unit, values))
     return shown
 
 
 def _over(statistic: object, values: Array, axis: int) -> Array:
-    """Return a statistic along an axis, NaN where no number is finite, without a warning."""
+    """Return a statistic along an axis; NaN for slices without a finite number.
+
+    Parameters
+    ----------
+    statistic : function of NumPy that ignores NaN, such as `numpy.nanmax`.
+    values : array of any shape.
+    axis : axis that the statistic removes.
+    """
     assert callable(statistic)
-    # NumPy warns of slices without a number: they are filled before, and are NaN after.
+    # NumPy warns about slices without a number. To avoid the warning, such slices are filled with
+    # zeros, and their results are replaced by NaN.
     known = np.isfinite(values).any(axis=axis)
     filled = np.where(np.expand_dims(known, axis), values, 0.0)
     return np.where(known, statistic(filled, axis=axis), np.nan)
 
 
 def explained(values: Array, parameter: Array) -> float:
-    """Return the share of the variance of `values` that lies between the values of a parameter.
+    """Return the share of the variance of a quantity that a parameter explains, from 0 to 1.
 
-    Where the values span decades, their logarithms are used. Both arrays are (runs,).
+    If the values of the quantity span decades, the variance is that of their logarithms.
+
+    Parameters
+    ----------
+    values : (runs,) values of the quantity. Values that are not finite are ignored.
+    parameter : (runs,) values of the parameter.
     """
     known = np.isfinite(values)
     y = np.log(values[known]) if is_wide(values) else values[known]
     whole = float(((y - y.mean()) ** 2).sum())
     if not whole:
         return 0.0
-    # Analysis of variance: the sum of squares between the groups of equal values of the parameter,
-    # relative to the whole sum.
+    # Analysis of variance: runs with the same value of the parameter form a group. The result is
+    # the sum of squares between groups, divided by the total sum of squares.
     between = 0.0
     for value in np.unique(parameter[known]):
         group = y[parameter[known] == value]
@@ -332,16 +363,19 @@ def explained(values: Array, parameter: Array) -> float:
     return between / whole
 
 
-# ---- What was found
+# ---- Answer and facts
 
 
 def sweep_answer(sweep: _Sweep, quantities: Sequence[RunQuantity]) -> list[Markup]:
-    """Return sentences: how the runs ended, and how parameters change the first two quantities.
+    """Return sentences on the statuses of the runs and on the first two quantities.
+
+    A sentence on a quantity gives its extreme values and the parameter that decides it, if there is
+    one.
 
     Parameters
     ----------
     sweep : the stored sweep.
-    quantities : of the runs, the most important first.
+    quantities : quantities of the runs, the most important first.
     """
     count = len(sweep.statuses)
     good = int(sweep.is_good.sum())
@@ -398,9 +432,15 @@ def _unit_after(unit: str) -> str:
 
 
 def _deciding(sweep: _Sweep, values: Array) -> str:
-    """Return a clause that names the parameter that explains most; "" where none explains enough.
+    """Return a clause on the parameter that explains most of the variance of a quantity.
 
-    Only a grid of two parameters or more has one. values : (runs,).
+    The clause is "" if this parameter explains too little, or if the sweep is not a grid of two
+    parameters or more.
+
+    Parameters
+    ----------
+    sweep : the stored sweep.
+    values : (runs,) values of the quantity.
     """
     if len(sweep.varied) < 2 or not sweep.grid_keys:
         return ""
@@ -410,7 +450,13 @@ def _deciding(sweep: _Sweep, values: Array) -> str:
 
 
 def common_values(sweep: _Sweep, runs: NDArray[np.int64]) -> str:
-    """Return the values of the varied parameters that all these runs share; "" where none."""
+    """Return in words the parameters that have the same value in all given runs; "" if none has.
+
+    Parameters
+    ----------
+    sweep : the stored sweep.
+    runs : indices of the runs.
+    """
     parts = []
     for key in sweep.varied:
         own = np.unique(sweep.parameters[key][runs])
@@ -420,15 +466,15 @@ def common_values(sweep: _Sweep, runs: NDArray[np.int64]) -> str:
 
 
 def _facts(sweep: _Sweep, quantities: Sequence[RunQuantity]) -> list[Fact]:
-    """Return the facts at the top of the page.
+    """Return the facts at the top of the page, at most four.
 
-    They are the number of good runs, the ranges of at most two parameters, and those of the first
-    quantities.
+    The facts are the number of good runs, the ranges of at most two parameters, and the ranges of
+    the first quantities.
 
     Parameters
     ----------
     sweep : the stored sweep.
-    quantities : of the runs; as many as there is room for are shown.
+    quantities : quantities of the runs, the most important first.
     """
     count, good = len(sweep.statuses), int(sweep.is_good.sum())
     is_checked = sweep.good_words == "ok"
@@ -443,7 +489,7 @@ def _facts(sweep: _Sweep, quantities: Sequence[RunQuantity]) -> list[Fact]:
         facts.append(Fact(with_capital(field_name(key)), shown, note))
     for quantity in quantities[: 4 - len(facts)]:
         known = quantity.values[np.isfinite(quantity.values)]
-        digits = 2 if is_wide(known) else 3  # those of the sentence
+        digits = 2 if is_wide(known) else 3  # the sentence in the answer has as many digits
         ends = text_range(*(number(float(end), digits) for end in (known.min(), known.max())))
         facts.append(Fact(with_capital(quantity.name), f"{ends}{_unit_after(quantity.unit)}"))
     return facts
@@ -455,13 +501,16 @@ def _facts(sweep: _Sweep, quantities: Sequence[RunQuantity]) -> list[Fact]:
 def _map(
     sweep: _Sweep, quantities: Sequence[RunQuantity], shown: NDArray[np.bool_]
 ) -> HeatMap | None:
-    """Return the map of a grid of two parameters; None for any other sweep or too large a grid.
+    """Return the map of the runs over two parameters.
+
+    None is returned if the sweep is not a grid of two parameters, if the grid is too large, or if
+    there is no quantity.
 
     Parameters
     ----------
     sweep : the stored sweep.
-    quantities : what the map can show; without one there is no map.
-    shown : (runs,) which runs are in the map, those of the first method.
+    quantities : quantities from which the reader chooses the one that the map shows.
+    shown : (runs,) whether each run is in the map. These are the runs of the first method.
     """
     if len(sweep.grid_keys) != 2 or not quantities:
         return None
@@ -513,19 +562,19 @@ def _map(
 
 
 def _curves(sweep: _Sweep, shown: NDArray[np.bool_]) -> tuple[list[Plot], NDArray[np.int64]]:
-    """Return the plots of one run, and where in their tables each run is.
+    """Return the plots that show the curves of one run at a time.
 
     Parameters
     ----------
     sweep : the stored sweep.
-    shown : (runs,) which runs may have curves, those of the first method.
+    shown : (runs,) whether each run may have curves. These are the runs of the first method.
 
     Returns
     -------
     plots : list of Plot
-        Each curve is a table (chosen runs, samples), of which the page shows one row.
+        The values of a curve are a table, (chosen runs, samples), of which the page shows one row.
     places : (runs,) ndarray of int
-        The row of each run; -1 where its curves are not on the page.
+        Row of each run in these tables; -1 if the page does not have its curves.
     """
     stored = sweep.stored
     places = np.full(len(sweep.statuses), -1)
@@ -555,7 +604,8 @@ def _curves(sweep: _Sweep, shown: NDArray[np.bool_]) -> tuple[list[Plot], NDArra
     if not wanted or len(time) < 2:
         return [], places
     columns = sum(len(curves) for _, _, curves in wanted)
-    # Only every so many-th sample is taken, so that the curves of four runs fit on the page.
+    # If the samples are too many for the curves of four runs, only every n-th sample is used, with
+    # n = `every`.
     every = max(1, math.ceil(len(time) * columns / (MAX_NUMBERS // 4)))
     samples = time[::every]
     runs = chosen_runs(sweep, shown, max(4, MAX_NUMBERS // (columns * len(samples))))
@@ -572,8 +622,8 @@ def _curves(sweep: _Sweep, shown: NDArray[np.bool_]) -> tuple[list[Plot], NDArra
         if unit == "N m":
             known = [float(np.abs(table[np.isfinite(table)]).max(initial=0.0)) for table in tables]
             scale, prefix = prefix_of(max(known))
-        # Quantities that follow from a load are interrupted at its jumps: at the first sample after
-        # it that is taken.
+        # A load jumps where the prescribed loads jump. Its curve is interrupted before the first
+        # used sample after each jump.
         breaks = (
             [-(-place // every) for place in jumps.breaks(time)] if title.endswith("moment") else []
         )
@@ -589,7 +639,11 @@ def _curves(sweep: _Sweep, shown: NDArray[np.bool_]) -> tuple[list[Plot], NDArra
 
 
 def _jumps(sweep: _Sweep) -> Jumps:
-    """Return the jumps of the base scene's loads, where the sweep does not vary them."""
+    """Return the jumps of the base scene's loads.
+
+    No jumps are returned if the sweep varies the duration, or the loads that may jump: the torque
+    and the pitch commands. The jumps may then differ from run to run.
+    """
     attributes = sweep.stored.attributes
     if not attributes.get("scene_toml") or any(
         key.startswith(("torque", "bearing.rest", "duration")) for key in sweep.keys
@@ -601,14 +655,15 @@ def _jumps(sweep: _Sweep) -> Jumps:
 def chosen_runs(sweep: _Sweep, shown: NDArray[np.bool_], most: int) -> NDArray[np.int64]:
     """Return the indices of the runs whose curves are on the page, ascending.
 
-    All, where they are not too many; else those that are not ok and the corners of the parameters,
-    which fill at most half of the room, and others at equal distances.
+    All runs are chosen if there are at most `most`. Otherwise at most half of the chosen runs are
+    the corners of the parameter ranges and runs that are not ok. The others are equally spaced
+    among all runs.
 
     Parameters
     ----------
     sweep : the stored sweep.
-    shown : (runs,) which runs may be chosen.
-    most : largest number of runs.
+    shown : (runs,) whether each run may be chosen.
+    most : largest number of chosen runs.
     """
     runs = np.flatnonzero(shown & (sweep.statuses >= 0))
     if len(runs) <= most:
@@ -617,7 +672,7 @@ def chosen_runs(sweep: _Sweep, shown: NDArray[np.bool_], most: int) -> NDArray[n
     for key in sweep.varied:
         values = sweep.parameters[key]
         is_corner &= (values == values.min()) | (values == values.max())
-    # Corners before failed runs: what is beyond half of the room is cut off.
+    # Corners come before failed runs, because the list is cut off at half of the number.
     first = [*np.flatnonzero(shown & is_corner), *runs[~sweep.is_good[runs]]]
     first = list(dict.fromkeys(int(run) for run in first if sweep.statuses[run] >= 0))[: most // 2]
     others = runs[np.linspace(0, len(runs) - 1, most - len(first)).astype(int)]
@@ -625,22 +680,23 @@ def chosen_runs(sweep: _Sweep, shown: NDArray[np.bool_], most: int) -> NDArray[n
 
 
 def _start(sweep: _Sweep, quantities: Sequence[RunQuantity], places: NDArray[np.int64]) -> int:
-    """Return the index of the run that is shown first.
+    """Return the index of the run that the page shows before the reader chooses another one.
 
-    Of the good runs with curves it is the one nearest to the middle of the grid; of a sweep that is
-    no grid the one whose first quantity is nearest to the median.
+    The run is chosen among good runs with curves. In a grid it is the run nearest to the middle. In
+    another sweep it is the run whose first quantity is nearest to the median.
 
     Parameters
     ----------
     sweep : the stored sweep.
-    quantities : of the runs; the first one decides where the sweep is no grid.
-    places : (runs,) row of each run in the tables of the curves; -1: it has no curves.
+    quantities : quantities of the runs, the most important first.
+    places : (runs,) row of each run in the tables of the curves; -1 if it has no curves.
     """
     candidates = np.flatnonzero((places >= 0) & sweep.is_good)
     if not len(candidates):
         candidates = np.flatnonzero(places >= 0) if (places >= 0).any() else np.arange(len(places))
     if sweep.grid_keys:
-        # The middle of the grid.
+        # Distance from the middle of the grid, as the sum of the distances in steps along each
+        # parameter.
         away = np.zeros(len(candidates))
         for key in sweep.grid_keys:
             values, index = np.unique(sweep.parameters[key], return_inverse=True)
@@ -659,15 +715,17 @@ def _start(sweep: _Sweep, quantities: Sequence[RunQuantity], places: NDArray[np.
 def _over_parameters(
     sweep: _Sweep, quantities: Sequence[RunQuantity], shown: NDArray[np.bool_]
 ) -> Section:
-    """Return the section with the first three quantities over each parameter.
+    """Return the section with plots of the first three quantities over the parameters.
 
-    For a grid of two parameters there is a curve per value of the second one; else a point per run.
+    For a grid of two parameters the quantities are plotted over the first parameter, with a curve
+    for each value of the second one. For any other sweep they are plotted over each of the first
+    three parameters, with a point for each run.
 
     Parameters
     ----------
     sweep : the stored sweep.
-    quantities : of the runs.
-    shown : (runs,) which of them are drawn, those of the first method.
+    quantities : quantities of the runs, the most important first.
+    shown : (runs,) whether each run is drawn. These are the runs of the first method.
     """
     chosen = quantities[:3]
     elements: list[Grid | Fold | Element] = []
@@ -724,7 +782,7 @@ def _parameter_curve(key: str, look: Look, parameter: Array, values: Array) -> C
 def _is_log(parameter: Array) -> bool:
     """Return whether the axis of a parameter is logarithmic.
 
-    It is where no value is negative and the positive ones span decades.
+    It is logarithmic if no value is negative and the positive values span decades.
     """
     return bool((parameter >= 0.0).all()) and is_wide(parameter[parameter > 0.0])
 
@@ -734,14 +792,14 @@ def _parameter_plot(
 ) -> Plot:
     """Return the plot of a quantity over a parameter.
 
-    Zero has no place on a logarithmic axis; its runs are left to the map.
+    If the axis of the parameter is logarithmic, runs in which the parameter is zero are left out.
 
     Parameters
     ----------
     sweep : the stored sweep.
-    key : the parameter.
-    quantity : gives the name, the unit and the scale of the vertical axis.
-    curves : of the quantity, over the values of the parameter.
+    key : name of the parameter.
+    quantity : the quantity on the vertical axis.
+    curves : curves of the quantity over the values of the parameter.
     """
     parameter = sweep.parameters[key]
     positive = parameter[parameter > 0.0]
@@ -755,7 +813,7 @@ def _parameter_plot(
         curves = kept
     unit = sweep.unit(key)
     low, high = float(shown.min()), float(shown.max())
-    # Room for the halves of the first and of the last dot.
+    # The range is extended a little, so that the first and the last dot are drawn whole.
     if is_log:
         room = (high / low) ** 0.02
         low, high = low / room, high * room
@@ -778,17 +836,21 @@ def _parameter_plot(
 
 
 def _faults_section(sweep: _Sweep, *, with_links: bool) -> Section:
-    """Return the runs that are not ok, grouped by status and reason, with the ranges of parameters.
+    """Return the section with a table of the runs that are not ok.
+
+    Runs with the same status and reason form a row. It has their number, the ranges of the
+    parameters, and an example.
 
     Parameters
     ----------
     sweep : the stored sweep.
-    with_links : whether there is a map or a plot that shows the example of each group.
+    with_links : whether the number of the example is a link that shows this run in the map or the
+        plots of the page.
     """
     groups: dict[tuple[int, str], list[int]] = {}
     messages = [text_of(characters) for characters in sweep.stored.column("message")]
     for run in np.flatnonzero(~sweep.is_good).tolist():
-        # Reasons that differ in numbers alone belong to one group.
+        # Reasons that differ only in their numbers belong to the same group.
         words = re.sub(r"[-+]?\d[\d.]*(e[-+]?\d+)?", "#", messages[run])
         groups.setdefault((int(sweep.statuses[run]), words), []).append(run)
     rows: list[Row] = []
@@ -818,13 +880,16 @@ def _faults_section(sweep: _Sweep, *, with_links: bool) -> Section:
 
 
 def _runs_section(sweep: _Sweep, quantities: Sequence[RunQuantity], *, with_links: bool) -> Section:
-    """Return all runs in a table that is folded, those that are not ok first.
+    """Return the section with a folded table of the runs, with those that are not ok first.
+
+    The table has at most _MAX_ROWS rows.
 
     Parameters
     ----------
     sweep : the stored sweep.
-    quantities : of the runs; as many columns as there is room for.
-    with_links : whether there is a map or a plot that shows a run whose number is clicked.
+    quantities : quantities of the runs. The table has columns for as many of them as fit.
+    with_links : whether the number of a run is a link that shows the run in the map or the plots of
+        the page.
     """
     chosen = quantities[: max(1, 6 - len(sweep.varied))]
     order = [*np.flatnonzero(~sweep.is_good).tolist(), *np.flatnonzero(sweep.is_good).tolist()][
@@ -868,12 +933,12 @@ def _runs_section(sweep: _Sweep, quantities: Sequence[RunQuantity], *, with_link
 
 
 def _details_section(sweep: _Sweep, quantities: Sequence[RunQuantity]) -> Section:
-    """Return what was varied, the distribution of every number, and the sweep's file, folded.
+    """Return the section of folded details: parameters, distributions of quantities, sweep file.
 
     Parameters
     ----------
     sweep : the stored sweep.
-    quantities : whose quantiles over the good runs are shown.
+    quantities : quantities of the runs. Their quantiles over the good runs are shown.
     """
     stored = sweep.stored
     parameters = sweep_parameters(stored)
