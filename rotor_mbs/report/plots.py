@@ -1,6 +1,6 @@
-"""Plot motion, energies and errors over time, and paths of the blade tips, from plain arrays.
+"""Plot motion, energies and errors over time, and paths of the blade tips.
 
-The classes do the same for runs that are in memory, for notebooks and scripts.
+The functions plot arrays. The classes plot runs that are in memory, for notebooks and scripts.
 """
 
 from __future__ import annotations
@@ -22,22 +22,24 @@ from rotor_mbs.solution.quantities import DEFECT, LOADS, Plot, Quantity
 from rotor_mbs.solution.trajectory import Array, Solution, Trajectory
 
 ANGLE_AXIS, RATE_AXIS = "angle (rad)", "rate (rad/s)"
-# Smallest value that is drawn on a logarithmic axis: a hundredth of the rounding error of a double
-# of order one.
+# Values up to this one are gaps on a logarithmic axis. It is a hundredth of the rounding error of a
+# double of order one.
 LOWEST = 1e-18
-HIGHEST = 1e15  # rad, or J: only a divergence is larger
-# A divergence is larger than this many times the 90 % quantile; it is cut off.
+# In the unit of the curve: larger errors, which only a divergence has, are drawn at this value.
+HIGHEST = 1e15
+# Values are a divergence, and are cut off, if the largest one exceeds the 90 % quantile by this
+# factor.
 _RUNAWAY = 8.0
-# The largest value counts as at most this many times the last samples: a larger peak has passed.
+# For this comparison the largest value counts as at most this many times the last samples. A larger
+# value is a peak after which the motion is small again.
 _STILL = 10.0
-# A range (rad, rad/s) that is rounding error.
+# rad or rad/s: a smaller range of values is rounding error.
 _ROUNDING = 1e-9
-# Largest number of points of a curve; see `thin`.
-_MAX_POINTS = 4000
+_MAX_POINTS = 4000  # approximate largest number of points of a drawn curve; see `thin`
 
 
 class Series(NamedTuple):
-    """A curve over time with its look."""
+    """A curve over time: times (n,) in s, values (n,), and look."""
 
     time: Array
     values: Array
@@ -47,13 +49,13 @@ class Series(NamedTuple):
 def motion(
     time: Array, angles: Array | None, rates: Array | None, horizon: float | None = None
 ) -> Panels:
-    """Plot angles above rates, each for the rotor and for the pitches.
+    """Plot angles and rates over time in up to four panels: rotor and pitches separately.
 
     Parameters
     ----------
     time : (n,) s.
-    angles, rates : (n, coordinates) rad and rad/s, rotor first; either may be None.
-    horizon : s, which is marked; None: it is not.
+    angles, rates : (n, coordinates) rad and rad/s, rotor first; None for no panels of these values.
+    horizon : horizon in s, which is marked by a line; None for no line.
     """
     rows: list[tuple[str, Sequence[Series]]] = []
     for name, values in ((ANGLE_AXIS, angles), (RATE_AXIS, rates)):
@@ -70,14 +72,14 @@ def coordinate_series(time: Array, values: Array) -> list[Series]:
 
 
 def draw_lines(axes: Any, series: Sequence[Series], label: str) -> None:
-    """Draw curves over one vertical axis.
+    """Draw curves over time on one vertical axis, and label the axis.
 
     Parameters
     ----------
-    axes : of matplotlib.
-    series : the curves; at least one. Long ones are thinned.
-    label : with the unit in brackets. Of other quantities than angles and rates the unit gets a
-        prefix, k, M or G, where the values are large.
+    axes : axes of matplotlib.
+    series : the curves; at least one. Long curves are thinned.
+    label : label of the axis with the unit in brackets. If the values are large, the unit gets a
+        prefix: k, M or G. Units that begin with rad get none.
     """
     shortest = min(len(curve.values) for curve in series)
     values = np.stack([curve.values[:shortest] for curve in series], axis=1)
@@ -94,17 +96,19 @@ def draw_lines(axes: Any, series: Sequence[Series], label: str) -> None:
 def set_range(axes: Any, values: Array) -> None:
     """Set the vertical range so that neither a divergence nor rounding errors fill it.
 
+    The range is not changed if the values have neither a divergence nor a range of rounding errors.
+
     Parameters
     ----------
-    axes : of matplotlib; left as they are where the values are ordinary.
-    values : (n, curves).
+    axes : axes of matplotlib.
+    values : (n, curves) values of the curves, rad or rad/s.
     """
     if is_cut(values):
         usual = float(np.quantile(np.abs(values).max(axis=1), 0.9))
         axes.set_ylim(-2.0 * usual, 2.0 * usual)
     elif values.max() - values.min() < _ROUNDING:
         middle = 0.5 * float(values.max() + values.min())
-        # From about 1e15 on a tenth is lost to rounding.
+        # A margin of 0.1 would be lost to rounding if the middle is about 1e15 or more.
         margin = 0.1 if middle + 0.1 > middle else 0.05 * abs(middle)
         axes.set_ylim(middle - margin, middle + margin)
 
@@ -114,13 +118,13 @@ def lines(
     horizon: float | None = None,
     heights: Sequence[float] = (),
 ) -> Panels:
-    """Plot panels one above the other over time.
+    """Plot curves over time in panels one below the other.
 
     Parameters
     ----------
-    rows : of each panel the label, with a unit, and its curves.
-    horizon : s, which is marked; None: it is not.
-    heights : of the panels, in; equal ones where left out.
+    rows : for each panel the label of its vertical axis, with a unit in brackets, and its curves.
+    horizon : horizon in s, which is marked by a line; None for no line.
+    heights : heights of the panels, in; () for equal heights.
     """
     panels = canvas.panels(tuple(heights) or (2.3,) * len(rows), TIME_AXIS)
     for axes, (label, series) in zip(panels.axes, rows, strict=True):
@@ -130,16 +134,20 @@ def lines(
 
 
 def component_panels(quantity: Quantity, plot: Plot, time: Array, values: Array) -> Panels:
-    """Return a panel per axis with a line per blade, or one panel with a line per axis or blade.
+    """Plot the components of a quantity over time.
+
+    Vectors of blades have a panel for each axis, with a line for each blade. Any other quantity has
+    one panel, with a line for each axis or for each blade.
 
     Parameters
     ----------
-    quantity : tells whether the second dimension is blades.
-    plot : gives the label of the vertical axis.
+    quantity : quantity whose second dimension is "blade" or "axis".
+    plot : how the quantity is plotted; it has the label of the vertical axis.
     time : (n,) s.
     values : (n, blades, 3), (n, blades) or (n, 3), in the quantity's unit.
     """
-    first = 1 if quantity.dimensions[1] == "blade" else 0  # a blade has the look of its pitch
+    # A line of a blade has the look of the blade's pitch angle, which is coordinate 1, 2, ...
+    first = 1 if quantity.dimensions[1] == "blade" else 0
     names = "xyz" if first == 0 else [f"blade {i + 1}" for i in range(values.shape[1])]
     panels = "xyz" if values.ndim == 3 else [""]
     components = values.reshape(*values.shape[:2], -1)
@@ -156,9 +164,9 @@ def errors(series: Sequence[Series], label: str, horizon: float | None = None) -
 
     Parameters
     ----------
-    series : the curves. Values up to LOWEST are gaps, those beyond HIGHEST are drawn there.
-    label : of the vertical axis.
-    horizon : s, which is marked; None: it is not.
+    series : the curves. Values up to LOWEST are gaps; values beyond HIGHEST are drawn at HIGHEST.
+    label : label of the vertical axis.
+    horizon : horizon in s, which is marked by a line; None for no line.
     """
     panels = canvas.panels((2.9,), TIME_AXIS)
     axes, known = panels.axes[0], []
@@ -175,7 +183,7 @@ def errors(series: Sequence[Series], label: str, horizon: float | None = None) -
             markevery=(first, step),
         )
         known += sizes[np.isfinite(sizes)].tolist()
-    # A little below, so that a curve at a power of ten does not lie on the axis.
+    # The factor lowers the axis a little, so that a curve at a power of ten does not lie on it.
     lowest = 0.7 * max(min([*known, 1.0] if known else [LOWEST]), LOWEST)
     canvas.log_axis(axes, lowest, max(known, default=1e-9))
     axes.set_ylabel(label)
@@ -185,31 +193,43 @@ def errors(series: Sequence[Series], label: str, horizon: float | None = None) -
 
 
 def thin(time: Array, values: Array) -> tuple[Array, Array]:
-    """Return the ends, and the smallest and the largest sample of equal intervals.
+    """Return the samples of a curve that are drawn if it has too many.
 
-    So no peak is lost. time and values are (n,).
+    They are the first and the last sample, and the smallest and the largest one of equally long
+    intervals, so that no peak is lost. A short curve is returned whole.
+
+    Parameters
+    ----------
+    time, values : (n,) times and values of the curve.
     """
     index = extremes(values, _MAX_POINTS)
     return time[index], values[index]
 
 
 def is_cut(values: Array) -> bool:
-    """Return whether the largest of these values (n, curves) are a divergence.
+    """Return whether the largest of these values are a divergence.
 
-    They are, where they exceed the usual values by far and the last samples are not small again: a
-    jolt that passes is not a divergence.
+    They are a divergence if they exceed the usual values by far, and the last samples are not small
+    again. A peak after which the values are small again is not a divergence.
+
+    Parameters
+    ----------
+    values : (n, curves).
     """
     largest = np.abs(values).max(axis=1)
     usual = float(np.quantile(largest, 0.9))
-    # The largest value counts by at most _STILL times what the last samples have, so that a peak
-    # after which the motion is small again does not count.
+    # The limit of _STILL times the last samples excludes a peak after which the values are small.
     return bool(min(largest.max(), _STILL * largest[-5:].max()) > _RUNAWAY * usual > 0.0)
 
 
 def mark_time(axes: Any, end: float, horizon: float | None) -> None:
-    """Draw a vertical line at the horizon, where that lies before the end of what is drawn.
+    """Draw a vertical line at the horizon, if the horizon is before the end of the curves.
 
-    end, horizon : s; without a horizon there is no line.
+    Parameters
+    ----------
+    axes : axes of matplotlib.
+    end : time of the last sample that is drawn, s.
+    horizon : horizon in s; None for no line.
     """
     if horizon is not None and horizon < end:
         axes.axvline(
@@ -226,8 +246,8 @@ def paths(tip: Array, tilt: float = 0.0) -> Panels:
 
     Parameters
     ----------
-    tip : (n, blades, 3) m, base frame.
-    tilt : of the shaft, rad.
+    tip : (n, blades, 3) positions of the tips, m, base frame.
+    tilt : tilt of the shaft, rad.
     """
     panels = canvas.panels((4.1,), "")
     draw_paths(panels.axes[0], tip, tilt)
@@ -235,13 +255,15 @@ def paths(tip: Array, tilt: float = 0.0) -> Panels:
 
 
 def draw_paths(axes: Any, tip: Array, tilt: float = 0.0) -> None:
-    """Draw paths of tips, the blades at the start (dashed) and at the end (solid), shaft and scale.
+    """Draw the paths of the blade tips, with the blades, the shaft and a scale.
+
+    The blades are drawn at the start (dashed) and at the end (solid).
 
     Parameters
     ----------
-    axes : of matplotlib.
-    tip : (n, blades, 3) m, base frame.
-    tilt : of the shaft, rad.
+    axes : axes of matplotlib.
+    tip : (n, blades, 3) positions of the tips, m, base frame.
+    tilt : tilt of the shaft, rad.
     """
     reach, lines, texts = picture_of(tip, tilt)
     axes.set(xlim=(-0.95 * reach, 0.95 * reach), ylim=(-1.02 * reach, 1.02 * reach), aspect="equal")
@@ -263,7 +285,7 @@ def draw_paths(axes: Any, tip: Array, tilt: float = 0.0) -> None:
     for place, text in texts:
         side = "left" if text == texts[-1][1] else "center"
         axes.text(*place, text, color=GREY, ha=side, va="center", fontsize="small")
-    # Lines without points, for the legend alone.
+    # Lines without points make entries in the legend.
     for dashes, width, label in (
         ("--", 1.6, "blade at the start"),
         ("-", 1.6, "at the end"),
@@ -279,7 +301,7 @@ class ComparisonPlots:
         self._runs, self._reference = list(runs.values()), reference
 
     def __call__(self) -> Panels:
-        """Plot the largest angle error of each run, same as `error`."""
+        """Plot the largest angle error of each run over time, as `error` does."""
         return self.error()
 
     def error(self) -> Panels:
@@ -288,7 +310,7 @@ class ComparisonPlots:
         Raises
         ------
         InputError
-            Without a reference, or for a run without angles.
+            If there is no reference, or a run has no angles.
         """
         if self._reference is None:
             raise InputError(
@@ -302,10 +324,13 @@ class ComparisonPlots:
     def defects(self) -> Panels:
         """Plot the interval defects (rad) of each run over time.
 
-        Those of a run of a sweep, which are not stored, are computed.
+        If a run has no stored defects, as a run of a sweep, they are computed from its angles and
+        rates.
 
-        Raises ------ InputError For a run with fewer than two samples, or without angles and rates
-        where defects are not stored.
+        Raises
+        ------
+        InputError
+            If a run has fewer than two samples, or has neither stored defects nor angles and rates.
         """
         series = []
         for run in self._runs:
@@ -315,7 +340,7 @@ class ComparisonPlots:
             if stored is not None:
                 sizes = stored[1:]
             else:
-                # late: SciPy, and an engine
+                # Imported only here, because this module imports SciPy and an engine.
                 from rotor_mbs.models.lagrange.defects import interval_defects
 
                 angles, rates = _quantity(run, "angles"), _quantity(run, "rates")
@@ -329,18 +354,18 @@ class ComparisonPlots:
         Raises
         ------
         InputError
-            For a run without angles.
+            If a run has no angles.
         """
         series = self._series([_quantity(run, "angles")[:, 0] for run in self._runs])
         return lines([("rotor angle (rad)", series)]).with_legend()
 
     def energy_error(self) -> Panels:
-        """Plot the energy error relative to the energy scale over time.
+        """Plot the energy error of each run, relative to its energy scale, over time.
 
         Raises
         ------
         InputError
-            For a run without energies.
+            If a run has no energies.
         """
         shares = []
         for run in self._runs:
@@ -369,7 +394,7 @@ class RunPlots(ComparisonPlots):
         Raises
         ------
         InputError
-            For a run without samples, or with neither angles nor rates.
+            If the run has no samples, or neither angles nor rates.
         """
         run = self._run
         horizon_s = None if self._reference is None else horizon(self._reference)
@@ -380,12 +405,12 @@ class RunPlots(ComparisonPlots):
         return motion(_some(run.time), shown, rates, horizon_s).with_legend()
 
     def energy(self) -> Panels:
-        """Plot kinetic and potential energy, and their sum minus the work (J).
+        """Plot kinetic and potential energy, and their sum minus the work (J), over time.
 
         Raises
         ------
         InputError
-            For a run without energies.
+            If the run has no energies.
         """
         run = self._run
         kinetic, potential, work = (
@@ -401,7 +426,8 @@ class RunPlots(ComparisonPlots):
     def loads(self, name: str = "blade_root_force") -> Panels:
         """Plot a load over time.
 
-        There is a panel per axis with a line per blade, or one panel with a line per axis or blade.
+        A force or a moment at the blade roots has a panel for each axis, with a line for each
+        blade. Any other load has one panel, with a line for each axis or for each blade.
 
         Parameters
         ----------
@@ -411,7 +437,7 @@ class RunPlots(ComparisonPlots):
         Raises
         ------
         InputError
-            For another name, or a run that does not have the load.
+            If `name` is another name, or the run does not have the load.
         """
         plotted = {load.name: load for load in LOADS if load.plot is not None}
         load = plotted.get(name)
@@ -426,7 +452,7 @@ class RunPlots(ComparisonPlots):
         Raises
         ------
         InputError
-            If the run does not have them.
+            If the run does not have these paths.
         """
         _some(self._run.time)
         return paths(_quantity(self._run, "tip"), self._run.scene.shaft_tilt).with_legend()
@@ -444,7 +470,7 @@ def _quantity(run: Solution, name: str) -> Array:
     Raises
     ------
     InputError
-        Where the run has no samples or no such quantity, or its file does not store it.
+        If the run has no samples or no such quantity, or its file does not store the quantity.
     """
     _some(run.time)
     try:
