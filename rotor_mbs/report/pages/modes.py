@@ -1,4 +1,4 @@
-"""Build the page of modes, and their figures."""
+"""Build the page of the modes of scenes, and the figures of `Modes.plot` in Python."""
 
 from __future__ import annotations
 
@@ -54,10 +54,13 @@ from rotor_mbs.solution.trajectory import Array
 
 _MARKS = ("o", "s", "^", "D", "v", "P", "x")
 _TURN = 2.0 * math.pi
-_ZERO = 1e-6  # share of the largest frequency; below it is that of a rigid motion
-_FLAT = 1e-3  # share of a damping ratio or growth rate; a smaller change is not magnified
-_TALL = 30.0  # of moduli; larger ones are drawn over a logarithmic axis
-_NOTHING = 1e-9  # 1/s, or of a frequency: a smaller growth or damping is rounding error
+# Frequencies below this share of the largest one are those of rigid motions, and count as zero.
+# Frequencies that differ by at most this share of the largest one count as equal.
+_ZERO = 1e-6
+# A change of damping ratios or growth rates below this share of the largest one is not magnified.
+_FLAT = 1e-3
+_TALL = 30.0  # if a modulus of a multiplier is larger, the axis is logarithmic
+_NOTHING = 1e-9  # smaller growth rates in 1/s, and smaller damping ratios, are rounding errors
 
 
 class ModePlots:
@@ -69,13 +72,14 @@ class ModePlots:
     def __call__(self) -> Panels:
         """Plot the Campbell diagram: damped frequencies (Hz) over the rotor speed (rpm).
 
-        The panels have the frequencies in the rotating frame, those in the fixed frame where whirl
-        is defined, and the change from the lowest speed. Dotted lines are multiples of the speed.
+        The panels have the frequencies in the rotating frame, the frequencies in the fixed frame if
+        whirl is defined, and the change of the former from the lowest speed. Dotted lines are
+        multiples of the speed.
 
         Raises
         ------
         InputError
-            Where no modes over speed were computed.
+            If no modes over speed were computed.
         """
         modes = self._rotation()
         motions = _motions(modes)
@@ -94,13 +98,15 @@ class ModePlots:
         change = np.where(is_fast, motions.rotating - first, np.nan)
         for axes, values in zip(panel.axes, [*frames.values(), change], strict=True):
             for k, name in enumerate(motions.names):
-                # Markers of each mode begin at another sample: equal curves lie on each other.
+                # The markers of each mode begin at another sample, so that curves that lie on each
+                # other can be told apart.
                 every = (k, len(motions.names) * max(1, len(rpm) // 24))
                 look = mode_look(k, name)
                 curve(axes, rpm, values[:, k], look, markevery=every, markersize=4.0)
         panel.axes[-1].set_ylabel("change (Hz)")
         panel.with_legend()
-        # The margin of the legend is a share of the height, of which this figure has more.
+        # The margin above the axes is set again, with more room for each line of the legend than
+        # `with_legend` leaves.
         lines = math.ceil(len(motions.names) / 2)
         height = float(panel.figure.get_figheight())
         panel.figure.subplots_adjust(top=1.0 - (0.15 + 0.24 * lines) / height)
@@ -112,7 +118,7 @@ class ModePlots:
         Raises
         ------
         InputError
-            Where no modes over speed were computed.
+            If no modes over speed were computed.
         """
         modes = self._rotation()
         panel = panels((2.0, 2.0), RPM_AXIS)
@@ -130,12 +136,12 @@ class ModePlots:
         Raises
         ------
         InputError
-            Where there are no multipliers.
+            If no multipliers were computed.
         """
         table = self._modes.floquet
         if table is None:
             reason = "no Floquet multipliers; they need gravity and speeds above 0"
-            for note in self._modes.notes:  # as where heyoka is not installed
+            for note in self._modes.notes:  # a note has the reason if, say, heyoka is missing
                 if note.startswith("no Floquet multipliers"):
                     reason = note
             raise InputError(f"{self._modes.scene}: {reason}")
@@ -166,7 +172,10 @@ class ModePlots:
 
 
 class _Motions(NamedTuple):
-    """Hold what a Campbell diagram shows: motions in both frames, or modes in the rotating one."""
+    """Hold the curves of a Campbell diagram, with their names.
+
+    The curves are motions in both frames if whirl is defined, else modes in the rotating frame.
+    """
 
     names: tuple[str, ...]
     rotating: Array  # (speeds, motions) Hz
@@ -192,16 +201,22 @@ def _top(frequencies: Array) -> float:
 
 
 def _first_known(frequencies: Array) -> Array:
-    """Return each column's value at the lowest speed that has one; 0 where none has."""
+    """Return the first finite value of each column of frequencies; 0 for a column without one.
+
+    Parameters
+    ----------
+    frequencies : (speeds, motions) Hz.
+    """
     columns = [column[np.isfinite(column)][:1] for column in frequencies.T]
     return np.array([column.sum() for column in columns])
 
 
 def _harmonics(blades: int) -> list[int]:
-    """Return the multiples of the rotor speed that are drawn: 1 to 6, and those of the blades.
+    """Return the multiples of the rotor speed that are drawn, ascending.
 
-    Gravity and shear excite a blade once per revolution; a tower or a fixed frame is excited by
-    each blade in turn.
+    They are 1 to 6, the number of blades, and twice this number. Gravity and wind shear excite a
+    blade once per revolution. A tower is excited by each blade in turn, and thus as many times per
+    revolution as there are blades.
     """
     return sorted({*range(1, 7), blades, 2 * blades})
 
@@ -211,14 +226,14 @@ def _draw_harmonics(axes: Any, modes: LinearModes, top: float) -> None:
 
     Parameters
     ----------
-    axes : of matplotlib, frequency (Hz) over the rotor speed (rpm).
+    axes : axes of matplotlib with frequency (Hz) over rotor speed (rpm).
     modes : modes over speed.
-    top : Hz, end of the vertical axis.
+    top : upper end of the vertical axis, Hz.
     """
     revolutions = np.abs(modes.speeds) * HERTZ
     fastest = float(revolutions[-1])
     multiples = _harmonics(modes.blades)
-    is_apart = fastest > 0.05 * top  # else the labels would lie on each other
+    is_apart = fastest > 0.05 * top  # if not, the labels would lie on each other
     for k in multiples:
         axes.plot(modes.speeds * RPM, k * revolutions, color=GREY, linewidth=0.7, linestyle=":")
         if fastest > 0.0 and (is_apart or k == multiples[-1]):
@@ -228,9 +243,14 @@ def _draw_harmonics(axes: Any, modes: LinearModes, top: float) -> None:
 
 
 def mode_look(index: int, name: str) -> Look:
-    """Return the line and the marker of a mode.
+    """Return the look of the curve of a mode, with its colour, line and marker.
 
-    Each mode has a marker of its own, since curves of equal frequencies lie on each other.
+    Up to seven modes have different markers, because curves of equal frequencies lie on each other.
+
+    Parameters
+    ----------
+    index : index of the mode.
+    name : name of the mode in the legend.
     """
     return replace(coordinate_look(index, name), marker=_MARKS[index % len(_MARKS)])
 
@@ -238,12 +258,12 @@ def mode_look(index: int, name: str) -> Look:
 def modes_page(modes: Sequence[SceneModes]) -> PageContent:
     """Return the content of the page of modes.
 
-    It has the modes of each scene over speed, under gravity, and at rest. The facts are those of
-    the first scene that has any.
+    The page has the modes of each scene over rotor speed, under gravity, and at rest. Its facts are
+    those of the first scene that has facts.
 
     Parameters
     ----------
-    modes : of each scene; at least one.
+    modes : modes of each scene; at least one scene.
     """
     sections: list[Section] = []
     answer: list[Markup] = []
@@ -267,9 +287,9 @@ def _first(kind: Mapping[str, LinearModes]) -> LinearModes | None:
 
 
 def mode_answer(scene: SceneModes) -> list[Markup]:
-    """Return sentences: faults, agreement of the models, frequencies at rest, and stability.
+    """Return sentences on faults, frequencies at rest, stability, and agreement of the models.
 
-    The agreement of the models comes last; where they do not agree it comes first.
+    If the models do not agree, the sentence on their agreement comes directly after the faults.
 
     Parameters
     ----------
@@ -329,7 +349,7 @@ def mode_answer(scene: SceneModes) -> list[Markup]:
 
 
 def _difference(scene: SceneModes) -> str:
-    """Return the largest difference of the models; rounded up where they agree within it."""
+    """Return the largest difference of the models as text; rounded up if the models agree."""
     size = scene.disagreement
     return number(size) if size > AGREEMENT else up_to(size)
 
@@ -366,7 +386,7 @@ def _facts(scene: SceneModes) -> list[Fact]:
         largest = float(np.nanmax(scene.floquet.largest))
         is_bad = bool((scene.floquet.stable == 0).any())
         note = "of a Floquet multiplier under gravity; above 1 is unstable"
-        digits = 6 if abs(largest - 1.0) < 0.01 else 3  # near 1 the difference from it counts
+        digits = 6 if abs(largest - 1.0) < 0.01 else 3  # near 1 the difference from 1 is needed
         facts.append(
             Fact("Largest modulus", number(largest, digits), note, "bad" if is_bad else "")
         )
@@ -374,7 +394,7 @@ def _facts(scene: SceneModes) -> list[Fact]:
 
 
 def _has_multipliers(table: FloquetTable) -> bool:
-    """Return whether there are multipliers but those that are 1 for every such motion."""
+    """Return whether the table has multipliers other than those that are 1 for every motion."""
     return bool((table.largest[np.isfinite(table.largest)] > 0.0).any())
 
 
@@ -383,9 +403,9 @@ def _scene_sections(scene: SceneModes, name: str, *, with_name: bool) -> list[Se
 
     Parameters
     ----------
-    scene : its modes.
-    name : begins the ids of the sections and the keys of the curves.
-    with_name : whether headings and axes name the scene, where a page has several.
+    scene : modes of the scene.
+    name : prefix of the ids of the sections and of the keys of the curves.
+    with_name : whether headings and axes name the scene, because the page has several scenes.
     """
     before = f"{scene.label}: " if with_name else ""
     axis_name = f"rotor speed of {scene.label}" if with_name else "rotor speed"
@@ -437,17 +457,18 @@ def _scene_sections(scene: SceneModes, name: str, *, with_name: bool) -> list[Se
 
 
 def _campbell(rotation: LinearModes, name: str, axis_name: str, before: str) -> list[Section]:
-    """Return the sections of frequencies in both frames, and of damping over speed.
+    """Return the section with the Campbell diagram, and the section with damping over speed.
 
-    Multiples of the rotor speed are drawn among the frequencies. The fixed frame is left out where
-    no whirl is defined, damping and growth where they are rounding error.
+    The diagram has the frequencies in both frames and multiples of the rotor speed. The plot in the
+    fixed frame is left out if no whirl is defined. The section with damping is left out if all
+    damping and growth is rounding error.
 
     Parameters
     ----------
     rotation : modes over speed.
-    name : begins the ids of the sections and the keys of the curves.
-    axis_name : of the horizontal axis, which is zoomed together with others of that name.
-    before : begins the headings.
+    name : prefix of the ids of the sections and of the keys of the curves.
+    axis_name : name of the horizontal axis. Plots with axes of the same name are zoomed together.
+    before : prefix of the headings.
     """
     rpm = rotation.speeds * RPM
     axis = Horizontal(axis_name, "rpm", "speed", float(rpm[0]), float(rpm[-1]))
@@ -467,7 +488,8 @@ def _campbell(rotation: LinearModes, name: str, axis_name: str, before: str) -> 
 
     def diagram(title: str, values: Array) -> Plot:
         lines = _harmonic_curves(rotation, _top(values), f"{name} harmonics")
-        # Names first: where there is no room for both, a multiple of the speed has none.
+        # The curves come before the multiples of the speed, because the texts at their ends are
+        # placed in this order. If there is too little room, a multiple has no text.
         return Plot(title, "Hz", axis, [*curves(values), *lines], 320, still=True)
 
     cards = [[diagram("Rotating frame", motions.rotating)]]
@@ -495,18 +517,18 @@ def _campbell(rotation: LinearModes, name: str, axis_name: str, before: str) -> 
 
 
 def _harmonic_curves(rotation: LinearModes, top: float, key: str) -> list[Curve]:
-    """Return multiples of the rotor speed in Hz as curves with their names.
+    """Return the curves of the multiples of the rotor speed in Hz, with their names.
 
     Parameters
     ----------
     rotation : modes over speed.
-    top : Hz, where the lines end.
-    key : of all lines.
+    top : frequency at which the curves end, Hz.
+    key : key of all these curves.
     """
     rpm = rotation.speeds * RPM
     lines = []
     for k in _harmonics(rotation.blades):
-        # To where the line leaves the plot, which is no sample.
+        # The line ends where it leaves the plot. The speed there is added, because it is not a sample.
         last = top / k / HERTZ * RPM
         ends = [end for end in (-last, last) if rpm[0] < end < rpm[-1]]
         places = np.unique([*rpm[np.abs(rpm) <= last], *ends])
@@ -517,12 +539,15 @@ def _harmonic_curves(rotation: LinearModes, top: float, key: str) -> list[Curve]
 
 
 def _names_beside(values: Array, names: Sequence[str]) -> list[str]:
-    """Return the text beside each curve: of equal curves the first has the names of all.
+    """Return the text at the end of each curve.
+
+    If several curves are equal, the text of the first one has the names of all of them, and the
+    others have the text "".
 
     Parameters
     ----------
-    values : (speeds, curves).
-    names : of the curves.
+    values : (speeds, curves) frequencies.
+    names : name of each curve.
     """
     top = _top(values)
     groups: list[list[int]] = []
@@ -544,13 +569,15 @@ def _names_beside(values: Array, names: Sequence[str]) -> list[str]:
 
 
 def _damping(rotation: LinearModes, name: str, axis: Horizontal) -> Section | None:
-    """Return the section of damping and growth over speed; None where they are rounding error.
+    """Return the section with damping ratios and growth rates over speed.
+
+    None is returned if all of them are rounding errors.
 
     Parameters
     ----------
     rotation : modes over speed.
-    name : begins the id of the section and the keys of the curves.
-    axis : rotor speed in rpm.
+    name : prefix of the id of the section and of the keys of the curves.
+    axis : horizontal axis with the rotor speed in rpm.
     """
     damping, growth = rotation.damping_ratios, rotation.growth_rates
     sizes = [np.nanmax(np.abs(values), initial=0.0) for values in (damping, growth)]
@@ -568,13 +595,16 @@ def _damping(rotation: LinearModes, name: str, axis: Horizontal) -> Section | No
 
 
 def _turning(scene: SceneModes, name: str, axis_name: str) -> Section | None:
-    """Return the section with the Floquet multipliers over speed; None without any.
+    """Return the section with plots of the Floquet multipliers over speed.
+
+    None is returned if the multipliers were not computed at two speeds or more, or if all of them
+    are 1 for every motion.
 
     Parameters
     ----------
-    scene : its modes; the section needs multipliers at two speeds or more.
-    name : begins the id of the section and the keys of the curves.
-    axis_name : of the horizontal axis, as for `_campbell`.
+    scene : modes of the scene.
+    name : prefix of the id of the section and of the keys of the curves.
+    axis_name : name of the horizontal axis; see `_campbell`.
     """
     table = scene.floquet
     if table is None or len(table.speeds) < 2 or not _has_multipliers(table):
@@ -589,7 +619,8 @@ def _turning(scene: SceneModes, name: str, axis_name: str) -> Section | None:
     ]
     largest = Curve(f"{name} largest", Look(VERMILLION, "-", "", "largest"), speeds, table.largest)
     known = shown[np.isfinite(shown)]
-    # What matters is which are above 1: small ones would take the range of a logarithmic axis.
+    # The multipliers above 1 are of interest. On a logarithmic axis small multipliers would take
+    # most of the range. They are cut off.
     is_log = float(known.max(initial=0.0)) > _TALL
     mark = [Mark("1: above it the motion is unstable", y=1.0)]
     plot = Plot(
@@ -673,7 +704,7 @@ def _multipliers(table: FloquetTable) -> PageTable:
 
 
 def _tables(linear: LinearModes, i: int) -> list[PageTable]:
-    """Return the tables of frequencies and of mode shapes at the speed of index `i`.
+    """Return two tables for one rotor speed: frequencies with damping, and mode shapes.
 
     Parameters
     ----------
@@ -707,7 +738,7 @@ def _tables(linear: LinearModes, i: int) -> list[PageTable]:
 
 
 def _over_speed(rotation: LinearModes) -> Fold:
-    """Return the frequencies in Hz over the rotor speed, a table for each frame.
+    """Return the folded tables of the frequencies (Hz) over the rotor speed, one for each frame.
 
     Parameters
     ----------
@@ -731,7 +762,10 @@ def _over_speed(rotation: LinearModes) -> Fold:
 
 
 def _shown(value: float, digits: int) -> str:
-    """Return a number; 0 for what is rounding error of an eigenvalue, a dash if not finite."""
+    """Return a number as text; "0" if it is a rounding error, a dash if it is not finite.
+
+    Magnitudes below _NOTHING are rounding errors of eigenvalues.
+    """
     if not math.isfinite(value):
         return NOTHING
     return number(0.0 if abs(value) < _NOTHING else value, digits)

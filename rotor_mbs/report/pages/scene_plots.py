@@ -1,4 +1,7 @@
-"""Plot a scene's stored runs: motion, loads, errors. Each plot is data for the page's script."""
+"""Make the plots of a scene's stored runs: motion, loads, errors.
+
+A plot is data (`elements.Plot`), which the page's script draws.
+"""
 
 from __future__ import annotations
 
@@ -20,35 +23,42 @@ from rotor_mbs.scenario.time_table import kink_times, values_at
 from rotor_mbs.solution.quantities import DEFECT, LOADS, Quantity, known_quantities
 
 Runs = Mapping[str, StoredRun]
-VISIBLE = 0.05  # rad: a difference that is visible in a figure of the paper's size
-CORRECTED, PRINTED = "corrected", "printed"  # keys of their curves
+VISIBLE = 0.05  # rad; a larger difference is visible in a figure of the paper's size
+CORRECTED, PRINTED = "corrected", "printed"  # keys of the curves of both models
 CORRECTED_LOOK = Look(PALETTE["reference"][0], "-", "", "corrected")
 PRINTED_LOOK = Look(INK, "--", "", "as printed")
-# A curve runs away, and is cut off, if it leaves the other's range by so many times that range.
+# A curve of the printed model runs away if it leaves the range of the correct curve by more than
+# _RUNAWAY times the height of this range. The height counts as at least _LEAST_HEIGHT.
 _RUNAWAY = 2.0
-_LEAST_HEIGHT = 0.5  # rad, rad/s: smallest range in that comparison
-# The start of a motion is cut off if it alone makes the range so many times that of the rest. Where
-# the rest is flat beside it, the start is all that there is to see.
-_START = 0.05  # share of the time
+_LEAST_HEIGHT = 0.5  # rad, rad/s
+# The start of a motion is the share _START of its time. A plot is cut off to the range after the
+# start if the whole range is more than _START_EXCESS times as large. It is not cut off if the whole
+# range is more than _FLAT times as large: the curves are then flat after the start, and only the
+# start is of interest.
+_START = 0.05
 _START_EXCESS, _FLAT = 3.0, 200.0
-_ROUNDING = 1e-9  # share of the largest component; a smaller one is zero
-LEAST_ANGLE = 1e-6  # rad, rad/s: a smaller range of an angle or a rate is not magnified
-# A value up to this is a gap on a logarithmic axis, as an exact zero is: it is far below the
-# rounding error of a double of order one.
+_ROUNDING = 1e-9  # components below this share of the largest one are rounding errors
+LEAST_ANGLE = 1e-6  # rad, rad/s; a smaller range of an angle or a rate is not magnified
+# Values up to this one are gaps on a logarithmic axis, as zeros are. It is far below the rounding
+# error of a double of order one.
 LOWEST = 1e-18
 _SPARK_WIDTH, _SPARK_HEIGHT, _SPARK_POINTS = 150.0, 34.0, 75
-_ALIGNED = 1e-9  # relative: a sample nearer than that to a jump is before it
+# A sample counts as at the time of a jump if it is later by at most this share of the time.
+_ALIGNED = 1e-9
 
 
 def time_axis(time: Array) -> Horizontal:
-    """Return the time axis of samples at `time` (n,) s; a single sample has an axis of 1e-12 s."""
+    """Return the time axis for samples at `time`, (n,) s.
+
+    The axis of a single sample is 1e-12 s long, because an axis needs a length.
+    """
     return Horizontal(
         "time", "s", "t", float(time[0]), max(float(time[-1]), float(time[0]) + 1e-12)
     )
 
 
 def whole_time(runs: Sequence[StoredRun]) -> Horizontal | None:
-    """Return the time axis of the longest of these runs; None without samples."""
+    """Return the time axis of the longest of these runs; None if no run has samples."""
     times = [run.array("time") for run in runs if run.samples]
     return time_axis(max(times, key=lambda time: float(time[-1]))) if times else None
 
@@ -57,22 +67,31 @@ def whole_time(runs: Sequence[StoredRun]) -> Horizontal | None:
 
 
 class Jumps(NamedTuple):
-    """Where prescribed loads jump: times (s), and what happens there."""
+    """The jumps of prescribed loads.
+
+    times : ascending times of the jumps, s.
+    texts : text for each jump: the load that jumps, and its value after the jump.
+    """
 
     times: Sequence[float]
     texts: Sequence[str]
 
     def marks(self, *, with_text: bool = False) -> list[Mark]:
-        """Return a mark for each jump; with_text is for the first plot of a group alone."""
+        """Return a vertical line for each jump, with its text only if `with_text` is true."""
         return [
             Mark(text if with_text else "", time)
             for time, text in zip(self.times, self.texts, strict=True)
         ]
 
     def breaks(self, time: Array) -> list[int]:
-        """Return the index of the first sample after each jump.
+        """Return the indices of the samples before which curves are interrupted.
 
-        A stored value that follows from the load has, at the time of a jump, the value before it.
+        They are the first samples after the jumps. A sample at the time of a jump is not after it,
+        because stored loads have the value before the jump at this time.
+
+        Parameters
+        ----------
+        time : (n,) times of the samples, s.
         """
         places = []
         for jump in self.times:
@@ -85,12 +104,12 @@ class Jumps(NamedTuple):
 def jumps_of(scene: Scene) -> Jumps:
     """Return the jumps of the scene's torques and pitch commands, sorted by time.
 
-    Where several loads jump at the same time, the text names the first of them: torque, pitch
-    torque, pitch command.
+    If several loads jump at the same time, the text has only one of them: the torque on the rotor
+    before a pitch torque, and a pitch torque before a pitch command.
 
     Parameters
     ----------
-    scene : whose rotor torque and pitch loads are searched.
+    scene : the scene with the loads.
     """
     tables = {"torque": [scene.rotor_torque], "pitch torque": [], "pitch command": []}
     for torque, rest in scene.pitch_loads:
@@ -118,14 +137,16 @@ def jumps_of(scene: Scene) -> Jumps:
 
 
 def range_of(right: Array, other: Array) -> tuple[float, float] | None:
-    """Return the range to which a plot is cut off; None where the other curve does not run away.
+    """Return the range to which a plot is cut off if one of its two curves runs away.
 
-    A curve of which that range would have no sample does not run away: it is shown whole.
+    The range is that of the correct curve, extended by its height on both sides. None is returned
+    if the other curve does not run away, or has no sample in this range. The plot is then not cut
+    off.
 
     Parameters
     ----------
-    right : the correct curve; its range and its own height on both sides are shown.
-    other : the curve that may run away. Values of both that are not finite are ignored.
+    right : values of the correct curve. Values that are not finite are ignored, here and below.
+    other : values of the curve that may run away.
     """
     known, others = right[np.isfinite(right)], other[np.isfinite(other)]
     if not len(known) or not len(others):
@@ -140,15 +161,16 @@ def range_of(right: Array, other: Array) -> tuple[float, float] | None:
 
 
 def settled_range(time: Array, columns: Sequence[Array]) -> tuple[float, float] | None:
-    """Return the range to which a plot is cut off whose curves jerk at the start; None without.
+    """Return the range to which a plot is cut off if its curves have large values at the start.
 
-    A motion that begins beside its equilibrium, as that of a turbine at a given speed does, has
-    loads there that hide all later ones.
+    A motion that does not begin in equilibrium, as that of a turbine at a given speed, may have
+    loads at the start that are much larger than all later ones. The range is that of the later
+    values with some room on both sides. None is returned if the start is not much larger.
 
     Parameters
     ----------
     time : (n,) s, or another quantity that increases.
-    columns : curves (n,) over it. Values that are not finite are ignored.
+    columns : values of each curve, (n,). Values that are not finite are ignored.
     """
     if len(time) < 3:
         return None
@@ -179,11 +201,11 @@ def models_plot(
 
     Parameters
     ----------
-    sides : the runs by "corrected" and "printed".
-    coordinate : 0 the rotor, i the pitch of blade i.
+    sides : run of each model, by "corrected" and "printed".
+    coordinate : 0 for the rotor, i for the pitch of blade i.
     name : "angles" or "rates".
-    axis : of time.
-    height, marks, still : as of `Plot`.
+    axis : axis of time.
+    height, marks, still : fields of the `Plot`.
     """
     curves, values = [], {}
     for side, look in ((CORRECTED, CORRECTED_LOOK), (PRINTED, PRINTED_LOOK)):
@@ -207,24 +229,25 @@ def models_plot(
 
 
 def largest(values: Array) -> Array:
-    """Return the largest over the components of each sample: (n,) of (n, ...)."""
+    """Return the largest component of each sample, (n,), of values (n, ...)."""
     result: Array = values.reshape(len(values), -1).max(axis=1)
     return result
 
 
 def angle_difference(first: StoredRun, second: StoredRun) -> Array:
-    """Return the largest difference over the coordinates at the samples that both runs have.
+    """Return the difference of the angles of two runs at each sample that both have, (n,) rad.
 
-    The result is (n,) rad.
+    The difference at a sample is the largest over the coordinates.
     """
     n = min(len(first.array("time")), len(second.array("time")))
     return largest(np.abs(first.array("angles")[:n] - second.array("angles")[:n]))
 
 
 def parting(printed: StoredRun, corrected: StoredRun) -> tuple[float | None, float]:
-    """Return when the angles of two runs first differ by VISIBLE, and the largest difference.
+    """Return when the angles of two runs begin to differ visibly, and their largest difference.
 
-    The time is in s, and None where they never do; the difference in rad.
+    The time (s) is that of the first sample at which an angle differs by more than VISIBLE; None if
+    there is no such sample. The largest difference is in rad.
     """
     gap = angle_difference(printed, corrected)
     apart = np.flatnonzero(gap > VISIBLE)
@@ -234,13 +257,18 @@ def parting(printed: StoredRun, corrected: StoredRun) -> tuple[float | None, flo
 
 
 def differing_coordinate(printed: StoredRun, corrected: StoredRun, first: int = 0) -> int:
-    """Return the coordinate, from `first` on, whose angles differ most.
+    """Return the index of the coordinate whose angle differs most between two runs.
 
-    Where none differs, it is the one that moves most in the corrected model.
+    If no angle differs, the coordinate with the largest angle in the corrected model is returned.
+
+    Parameters
+    ----------
+    printed, corrected : runs with angles of both models.
+    first : smallest index that is considered: 0 for all coordinates, 1 for the pitches.
     """
     angles = printed.array("angles"), corrected.array("angles")
     n = min(map(len, angles))
-    # By the difference; where that is nothing, by the motion of the corrected model.
+    # First by the difference. If it is negligible, by the angles of the corrected model.
     for values in (angles[0][:n] - angles[1][:n], angles[1]):
         sizes = np.abs(values[:, first:]).max(axis=0, initial=0.0)
         if sizes.size and sizes.max() > LEAST_ANGLE:
@@ -253,8 +281,8 @@ def spark(curves: Sequence[tuple[Array, Array, Look]], low: float, high: float) 
 
     Parameters
     ----------
-    curves : (time, values, look) each; time (n,) s, values (n,).
-    low, high : the range of the values; curves are cut off a little beyond it.
+    curves : time (n,) in s, values (n,) and look of each curve.
+    low, high : range of the values. Curves are cut off a little beyond it.
     """
     end = max((float(time[-1]) for time, _, _ in curves if len(time)), default=0.0) or 1.0
     room = 0.12 * (high - low) or 1.0
@@ -280,10 +308,14 @@ def spark(curves: Sequence[tuple[Array, Array, Look]], low: float, high: float) 
 
 
 class Channel(NamedTuple):
-    """Components of a quantity that share an axis: values (n,) by curve, in units of `unit`.
+    """The curves of a run that one plot shows, such as the components of a load along one axis.
 
-    floor : what is smaller is rounding error, and zero.
-    breaks : samples before which the curves are interrupted.
+    name : title of the plot.
+    unit : unit of the values.
+    curves : key, look and values (n,) of each curve.
+    floor : in `unit`; a smaller range of values is rounding error, and smaller values count as 0.
+    note : addition to name and unit, such as the frame of a vector.
+    breaks : indices of the samples before which the curves are interrupted.
     """
 
     name: str
@@ -306,9 +338,9 @@ class Channel(NamedTuple):
 
         Parameters
         ----------
-        axis : of time.
-        time : (n,) s, of the values.
-        height, marks, still : as of `Plot`.
+        axis : axis of time.
+        time : (n,) times of the values, s.
+        height, marks, still : fields of the `Plot`.
         """
         curves = [Curve(key, look, time, values, self.breaks) for key, look, values in self.curves]
         return Plot(
@@ -326,27 +358,28 @@ class Channel(NamedTuple):
 
 
 def blade_look(blade: int) -> Look:
-    """Return the look of what belongs to a blade, 0 the first."""
+    """Return the look of the curves that belong to a blade; the first blade is 0."""
     return coordinate_look(blade + 1, f"blade {blade + 1}")
 
 
 def in_units(values: Sequence[Array], unit: str) -> tuple[float, str]:
-    """Return by what the values of a channel are divided, and their unit with its prefix."""
+    """Return the divisor for the values of a channel, and their unit with the matching prefix."""
     known = [float(np.abs(array[np.isfinite(array)]).max(initial=0.0)) for array in values]
     scale, prefix = prefix_of(max(known, default=0.0))
     return scale, f"{prefix}{unit}"
 
 
 def quantity_channels(quantity: Quantity, run: StoredRun, jumps: Jumps) -> list[Channel]:
-    """Return a stored quantity's channels: one for each axis of vectors, else one.
+    """Return the channels of a stored quantity: three if it has vectors, else one.
 
-    A component that is below 1e-9 of the largest is rounding error.
+    Each channel of vectors has the components along one axis. Components below 1e-9 of the largest
+    one are rounding errors, which sets the floor of the channels.
 
     Parameters
     ----------
-    quantity : tells the dimensions, the unit and the frame.
-    run : has the quantity.
-    jumps : of the prescribed loads; quantities that follow from a load are interrupted there.
+    quantity : the quantity.
+    run : run that has the quantity.
+    jumps : jumps of the prescribed loads. Curves of loads are interrupted there.
     """
     values = run.array(quantity.name)
     breaks = jumps.breaks(run.array("time")) if quantity.output == "loads" else []
@@ -398,17 +431,20 @@ def quantity_channels(quantity: Quantity, run: StoredRun, jumps: Jumps) -> list[
 
 
 def load_channels(stored: StoredScene, run: StoredRun, jumps: Jumps) -> list[Channel]:
-    """Return the channels of the loads that a run has, and of quantities of installed packages.
+    """Return the channels of a run's loads, and of quantities of other packages.
+
+    Moments and forces at the blade roots come first, then those of the shaft.
 
     Parameters
     ----------
-    stored : the scene, whose outputs are shown; moments of roots and shaft come first.
-    run : the run; quantities that it does not have are left out.
-    jumps : of the prescribed loads, at which curves are interrupted.
+    stored : the scene. Only quantities among its outputs are shown.
+    run : the run. Quantities that it does not have are left out.
+    jumps : jumps of the prescribed loads. Curves of loads are interrupted there.
     """
     channels = []
     built_in = {"angles", "rates", "tip", "energy", ""}
-    # Moments first: they are what a root or a shaft is designed for.
+    # Moments come before the forces at the same place, because a root or a shaft is designed for
+    # moments.
     first = ("blade_root_moment", "blade_root_force", "shaft_moment", "shaft_force")
     quantities = sorted(
         known_quantities(stored.scene.outputs),
@@ -424,16 +460,20 @@ def load_channels(stored: StoredScene, run: StoredRun, jumps: Jumps) -> list[Cha
 
 
 def values_over(table: Sequence[tuple[float, float]], time: Array) -> tuple[Array, Array]:
-    """Return a prescribed load by its own points within the time of a run.
+    """Return the points of a prescribed load within the duration of a run.
+
+    A load is linear between the rows of its table. The points are therefore these rows, not the
+    samples of the run. Points at time 0 and at the end of the run are added if the table has none.
 
     Parameters
     ----------
-    table : (time, value) points, ascending.
-    time : (n,) s, of the run; a point is added at 0 and at its end where the table has none.
+    table : rows (time, value) with ascending times in s.
+    time : (n,) times of the run's samples, s.
 
     Returns
     -------
-    times, values : (points,) each.
+    times, values : (points,) ndarray each
+        Times in s, and values in the unit of the table.
     """
     end = float(time[-1])
     points = [(at, value) for at, value in table if 0.0 <= at <= end]
@@ -450,16 +490,20 @@ def values_over(table: Sequence[tuple[float, float]], time: Array) -> tuple[Arra
 
 
 def positive(values: Array) -> Array:
-    """Return magnitudes for a logarithmic axis: exact zeros are gaps."""
+    """Return the magnitudes of values for a logarithmic axis; NaN for magnitudes up to LOWEST."""
     sizes = np.abs(values)
     result: Array = np.where(sizes > LOWEST, sizes, np.nan)
     return result
 
 
 def error_curves(runs: Runs, values: Mapping[str, Array], first: int = 0) -> list[Curve]:
-    """Return a curve per method over the samples from `first` on, for a logarithmic axis.
+    """Return a curve for each method, for a plot with a logarithmic axis.
 
-    values : by method, one for each of these samples. A value of zero is a gap.
+    Parameters
+    ----------
+    runs : runs by method.
+    values : values of each method, one for each sample from `first` on. Zeros are gaps.
+    first : index of the sample to which the first value belongs.
     """
     curves = []
     for method, array in values.items():
@@ -471,15 +515,16 @@ def error_curves(runs: Runs, values: Mapping[str, Array], first: int = 0) -> lis
 def error_plot(
     name: str, unit: str, curves: Sequence[Curve], axis: Horizontal, **more: object
 ) -> Plot:
-    """Return a plot on a logarithmic axis; `more` are further fields of `Plot`."""
+    """Return a plot of errors on a logarithmic axis; `more` are further fields of the `Plot`."""
     plot = Plot(name, unit, axis, curves, 240, log=True)
     return replace(plot, **more)  # type: ignore[arg-type]
 
 
 def angle_errors(scene: StoredScene, runs: Runs) -> dict[str, Array]:
-    """Return each run's largest angle difference from the reference, (n,) rad, by method.
+    """Return the angle error of each run at its samples, (n,) rad, by method.
 
-    Runs without angles are left out; without a reference there are none.
+    The error at a sample is the largest over the coordinates. Runs without angles are left out. The
+    dict is empty if there is no reference with angles.
     """
     reference = scene.reference
     if reference is None or "angles" not in reference:
@@ -491,7 +536,10 @@ def angle_errors(scene: StoredScene, runs: Runs) -> dict[str, Array]:
 
 
 def energy_errors(runs: Runs) -> dict[str, Array]:
-    """Return each run's energy error relative to its energy scale, (n,), by method."""
+    """Return the magnitude of each run's energy error, relative to its energy scale, by method.
+
+    Each array is (n,). Runs without an energy error or a scale, and the reference, are left out.
+    """
     errors = {}
     for method, run in runs.items():
         scale = None if method == REFERENCE else run.attributes.get("energy_scale_J")
@@ -501,9 +549,9 @@ def energy_errors(runs: Runs) -> dict[str, Array]:
 
 
 def interval_errors(runs: Runs) -> dict[str, Array]:
-    """Return the defects of the intervals, (n - 1,) rad, of each run that has them, by method.
+    """Return the interval defects of each run in the file, (n - 1,) rad, by method.
 
-    They are those of the file, from the second sample on: pages integrate nothing.
+    Runs without stored defects are left out, because pages integrate nothing.
     """
     sizes = {}
     for method, run in runs.items():
