@@ -1,4 +1,4 @@
-"""Build the page of the paper's figures, in the paper's own layout beside the corrected model."""
+"""Build the page of the paper's figures, recomputed by the printed and by the corrected model."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def figures_page(report: Report) -> PageContent:
         if pictures:
             sections.append(_figure_section(figure, pictures, report))
     methods = {section.say for section in sections}
-    if len(methods) == 1:  # said once, at the top
+    if len(methods) == 1:  # the text on the methods is the same, and stands once in the answer
         sections = [replace(section, say="") for section in sections]
     departing = []
     for figure in available(report.scenes):
@@ -110,13 +110,13 @@ def _figure_section(
     pictures: Mapping[str, Mapping[str, Mapping[str, StoredRun]]],
     report: Report,
 ) -> Section:
-    """Return the section of one figure: a column per model, published numbers, and initial states.
+    """Return the section of one figure: its plots, published numbers, and initial states.
 
     Parameters
     ----------
-    figure : one of the paper's.
-    pictures : its runs by row, then by model, then by label; see `panel_runs`.
-    report : the open results file, with the claims and the files of the scenes.
+    figure : a figure of the paper.
+    pictures : runs of the figure by row, then by model, then by label; see `panel_runs`.
+    report : the open results file, with the claims and the files of the scenes' pages.
     """
     elements: list[Grid | Fold | Element] = []
     numbers = paper.number_table(
@@ -131,7 +131,8 @@ def _figure_section(
         elements.append(numbers)
     for letter, name in figure.panels:
         stored = report.scenes[name]
-        initial = tomllib.loads(stored.scene.text)["initial"]  # pi/6 as it is written
+        # The text of the scene has expressions such as "pi/6", which are shown as they are written.
+        initial = tomllib.loads(stored.scene.text)["initial"]
         angles, rates = (
             ", ".join(_as_written(value) for value in initial[key]) for key in ("angles", "rates")
         )
@@ -151,7 +152,8 @@ def _figure_section(
         for row in pictures.values()
         for key, runs in row.items()
     }
-    # "As printed: ode45", not "As printed: as printed, ode45".
+    # The label of a printed method repeats the heading: "as printed, ode45". The repeated words are
+    # removed.
     lines = [
         f"{HEADINGS[key]}: {methods[key].removeprefix(f'{HEADINGS[key].lower()}, ')}"
         for key in SIDES
@@ -167,19 +169,19 @@ def _figure_section(
 
 
 def _as_written(value: float | str) -> str:
-    """Return an initial value of a scene file as it is typeset: "11π/12" for "11*pi/12"."""
+    """Return an initial value of a scene file typeset as text: "11π/12" for "11*pi/12"."""
     return minus(str(value).replace("*pi", "π").replace("pi", "π"))
 
 
 def _motion_plots(
     figure: PaperFigure, row: Mapping[str, Mapping[str, StoredRun]]
 ) -> tuple[Legend, Grid]:
-    """Return the legend and the plots of positions and velocities, a column per model.
+    """Return the legend and the plots of positions and velocities, with a column for each model.
 
     Parameters
     ----------
-    figure : of motion, or of torques, which shows the rotor alone.
-    row : the runs by model, then by label; at least one has samples.
+    figure : a figure of motion or torques. A figure of torques shows only the rotor.
+    row : runs by model, then by label. At least one run has samples.
     """
     runs = [run for side in SIDES for run in row.get(side, {}).values()]
     axis = whole_time(runs)
@@ -224,9 +226,16 @@ def _motion_plots(
 def _usual_range(
     curves: Sequence[Curve], row: Mapping[str, Mapping[str, StoredRun]], name: str
 ) -> tuple[float, float] | None:
-    """Return the range of the corrected model where one of these curves runs away from it.
+    """Return the range to which a plot is cut off if one of its curves runs away.
 
-    None where none does, or where there is no corrected model.
+    The range is a little larger than that of the corrected model. None is returned if no curve runs
+    away, or if there is no corrected model.
+
+    Parameters
+    ----------
+    curves : curves of the plot.
+    row : runs of the figure by model, then by label.
+    name : "angles" or "rates", the quantity of the curves.
     """
     right = [run.array(name).ravel() for run in row.get(CORRECTED, {}).values()]
     if not right:
@@ -235,7 +244,12 @@ def _usual_range(
 
 
 def _path_plots(pictures: Mapping[str, Mapping[str, Mapping[str, StoredRun]]]) -> Grid:
-    """Return still pictures of the paths of the tips, one for each model and panel."""
+    """Return still pictures of the paths of the tips, one for each panel and model.
+
+    Parameters
+    ----------
+    pictures : runs of the figure by row, then by model, then by label.
+    """
     cards: list[list[Element]] = []
     for row in pictures.values():
         for side in SIDES:

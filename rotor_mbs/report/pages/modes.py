@@ -528,7 +528,7 @@ def _harmonic_curves(rotation: LinearModes, top: float, key: str) -> list[Curve]
     rpm = rotation.speeds * RPM
     lines = []
     for k in _harmonics(rotation.blades):
-        # The line ends where it leaves the plot. The speed there is added, because it is not a sample.
+        # The line ends where it leaves the plot. The speed there is not a sample, and is added.
         last = top / k / HERTZ * RPM
         ends = [end for end in (-last, last) if rpm[0] < end < rpm[-1]]
         places = np.unique([*rpm[np.abs(rpm) <= last], *ends])

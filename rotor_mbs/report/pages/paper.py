@@ -1,4 +1,4 @@
-"""Build the pages of the paper's claims and of its errata, and tables of both for other pages."""
+"""Build the pages of the paper's claims and errata, and tables of them for other pages."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ PAPER = Markup(
 
 
 def quantity_of(claim: Published) -> str:
-    """Return the name of a published number: "crest", "largest rotor rate"."""
+    """Return the name of a published number, such as "crest" or "largest rotor rate"."""
     if claim.id.endswith("-crest"):
         return "crest"
     return (
@@ -69,12 +69,12 @@ def unit_of_claim(claim: Published) -> str:
 
 
 def number_table(claims: Iterable[Published], *, with_figure: bool = True) -> PageTable:
-    """Return the published numbers, a row each: as published, as printed, corrected.
+    """Return a table of the published numbers beside the results of both models.
 
     Parameters
     ----------
-    claims : of the paper; those in words are left out.
-    with_figure : whether each row names the figure.
+    claims : numbers and claims of the paper. Claims in words are left out.
+    with_figure : whether each row has the number of the paper's figure.
     """
     rows: list[Row] = []
     for claim in claims:
@@ -92,7 +92,13 @@ def number_table(claims: Iterable[Published], *, with_figure: bool = True) -> Pa
 
 
 def _verdict(value: float | None, item: Published) -> TableCell:
-    """Return a cell with a computed number, marked by whether it has the published digits."""
+    """Return a cell with a computed number, marked by whether it has the published digits.
+
+    Parameters
+    ----------
+    value : the computed number; None gives a dash.
+    item : the published number.
+    """
     if value is None:
         return TableCell(NOTHING)
     holds = rounds_to(value, item)
@@ -107,12 +113,12 @@ def _claim_cell(verdict: str) -> TableCell:
 
 
 def claim_table(claims: Iterable[Published], study: ClaimStudy) -> PageTable:
-    """Return the claims in words, a row each, with their quotations and verdicts.
+    """Return a table of the claims in words with their quotations and verdicts.
 
     Parameters
     ----------
-    claims : of the paper; those that are numbers are left out.
-    study : the verdicts on each claim, by model.
+    claims : numbers and claims of the paper. Numbers are left out.
+    study : verdicts on each claim for both models.
     """
     rows: list[Row] = []
     for claim in claims:
@@ -131,7 +137,7 @@ def claim_table(claims: Iterable[Published], study: ClaimStudy) -> PageTable:
 
 
 def count_table(study: ClaimStudy) -> PageTable:
-    """Return how many claims hold, fail or are undecided, for each model."""
+    """Return a table with the numbers of claims that hold, fail or are undecided, by model."""
     names = {HOLDS: "hold", FAILS: "fail", UNDECIDED: "undecided: rounding decides"}
     rows = [
         [text, *(str(study.count(method, verdict)) for method in study.methods)]
@@ -143,7 +149,7 @@ def count_table(study: ClaimStudy) -> PageTable:
 
 
 def study_note(study: ClaimStudy) -> str:
-    """Return a text about the runs on which the verdicts are based, with the rule for them."""
+    """Return a text on the runs on which the verdicts are based, and on the rule for a verdict."""
     durations = ", ".join(f"{duration:g}" for duration in study.durations)
     return (
         f"Based on {study.runs} runs of each scene for each of the durations {durations} s, with "
@@ -153,13 +159,16 @@ def study_note(study: ClaimStudy) -> str:
 
 
 def claims_section(claims: Sequence[Published], report: Report, scene: StoredScene) -> Section:
-    """Return what the paper says of one scene, a row per number and claim, with verdicts.
+    """Return the section with a table of the paper's numbers and claims about a scene.
+
+    Each row has the verdicts for both models.
 
     Parameters
     ----------
-    claims : about the scene.
-    report : the open results file, with verdicts on claims, and conditions.
-    scene : the scene; only a shipped one has conditions that were found out.
+    claims : the paper's numbers and claims about the scene.
+    report : the open results file, with the verdicts on the claims, and the conditions that the
+        paper does not print.
+    scene : the scene. Conditions are shown only if its motion is that of the shipped scene.
     """
     rows: list[Row] = []
     study = report.study
@@ -236,13 +245,14 @@ def claims_page(report: Report) -> PageContent:
 
 
 def equations_of(erratum: Erratum) -> str:
-    """Return in which equations an erratum stands: "equations (8), (17)"."""
+    """Return the equations in which an erratum is printed, as text: "equations (8), (17)"."""
     plural = "s" if len(erratum.stands_in) > 1 else ""
     return f"equation{plural} {', '.join(erratum.stands_in)}"
 
 
 _PLACE = re.compile(r"row (\d) column (\d)")
-Cell = tuple[Markup, Markup | None]  # an entry as printed; the correct one where it is faulty
+# An entry of a matrix as printed, and the correct entry; None if the printed entry is correct.
+Cell = tuple[Markup, Markup | None]
 
 
 def errata_page(report: Report) -> PageContent:
@@ -250,7 +260,7 @@ def errata_page(report: Report) -> PageContent:
 
     Parameters
     ----------
-    report : the open results file; the effect of each erratum is taken from its runs.
+    report : the open results file. The effects of the errata are taken from its runs.
     """
     entries = checked_entries()
     largest_agreeing = max((entry.difference for entry in entries if entry.agrees), default=0.0)
@@ -302,7 +312,7 @@ def errata_page(report: Report) -> PageContent:
             Section(erratum.id, heading, [Grid(1, [elements])], say if has_matrices else "")
         )
         if has_matrices:
-            say = ""  # it stands above the first matrices alone
+            say = ""  # only the first section with matrices has the text
     head = ("Equation", "Entry", "Printed", "Correct", "Difference", "Explained by")
     rows_of_entries: list[Row] = []
     for entry in differing:
@@ -347,9 +357,14 @@ _ALONE = (
 
 
 def _effect(report: Report, erratum: str) -> tuple[str, str]:
-    """Return the largest angle error that one erratum alone makes, and the scene, as texts.
+    """Return two texts: the largest angle error due to one erratum alone, and its scene.
 
-    The first text is a dash where no run has this erratum alone.
+    The first text is a dash if the file has no run with this erratum alone.
+
+    Parameters
+    ----------
+    report : the open results file.
+    erratum : identifier of the erratum, such as "E1".
     """
     largest = largest_of(report, errata_methods().get(erratum, ""), "angle_error_max")
     if largest is None:
@@ -359,7 +374,16 @@ def _effect(report: Report, erratum: str) -> tuple[str, str]:
 
 
 def largest_of(report: Report, method: str, name: str) -> tuple[float, str] | None:
-    """Return the largest finite number `name` of a method's runs, and the scene, or None."""
+    """Return the largest finite value of a metric in a method's runs, and the name of its scene.
+
+    None is returned if no run of the method has a finite value.
+
+    Parameters
+    ----------
+    report : the open results file.
+    method : name of the method.
+    name : name of the metric.
+    """
     found = []
     for scene in report.scenes.values():
         run = scene.runs.get(method)
@@ -372,12 +396,12 @@ def largest_of(report: Report, method: str, name: str) -> tuple[float, str] | No
 def matrices(
     entries: Sequence[CheckedEntry], equations: Sequence[str]
 ) -> list[tuple[str, list[list[Cell]]]]:
-    """Return (equation, rows of its matrix) for each of the equations that is a matrix.
+    """Return the matrices among given equations: (name of the equation, rows of the matrix) each.
 
     Parameters
     ----------
-    entries : of all equations, each with its place in the matrix.
-    equations : names of equations, as in `Erratum.stands_in`.
+    entries : checked entries of all equations, each with its place.
+    equations : names of the equations, as in `Erratum.stands_in`.
     """
     shown = []
     for equation in equations:

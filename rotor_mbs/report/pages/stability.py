@@ -1,4 +1,4 @@
-"""Build the page of the stability suite: the map of all scenes and methods."""
+"""Build the page of the stability suite, with a map of the outcomes of all scenes and methods."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ from rotor_mbs.report.numbers import in_words, typeset_title
 from rotor_mbs.report.pages import Report, method_cell
 from rotor_mbs.studies.stability import OUTCOMES, SuiteRun, suite_table
 
-_NAMES = 3  # in a sentence
-_METHODS_IN_A_TABLE = 7  # beside the scene, on a page of 1440 px
-_WRONG = ("inaccurate", "diverged", "singular", "solver_failed")
+_NAMES = 3  # largest number of methods whose names a sentence has
+_METHODS_IN_A_TABLE = 7  # number of columns beside the scenes that fit a page of 1440 px
+_WRONG = ("inaccurate", "diverged", "singular", "solver_failed")  # outcomes of wrong results
 
 
 def stability_page(report: Report) -> PageContent:
-    """Return the content of the map, which is the index of the suite.
+    """Return the content of the page of the stability suite, which is the index of its report.
 
     Parameters
     ----------
-    report : the open results file, with runs of the suite.
+    report : the open results file, with the runs of the suite.
     """
     runs = report.suite_runs
     methods = list(dict.fromkeys(run.method for run in runs))
@@ -75,12 +75,12 @@ def stability_page(report: Report) -> PageContent:
 
 
 def ranking(compared: Sequence[SuiteRun], methods: Sequence[str]) -> list[Markup]:
-    """Return a sentence on the methods that are ok on most scenes, and one on those of the fewest.
+    """Return sentences on the methods that are ok on the most and on the fewest scenes.
 
     Parameters
     ----------
-    compared : the runs of scenes that have a solution.
-    methods : names, in the order of the map.
+    compared : runs of the suite that are counted.
+    methods : names of the methods, in the order of the map.
     """
     if not methods:
         return []
@@ -95,7 +95,8 @@ def ranking(compared: Sequence[SuiteRun], methods: Sequence[str]) -> list[Markup
     verb = "is" if len(names) == 1 else "are"
     which = with_capital(" and ".join(names[:3]))
     sentences = [text.format(which, verb, best, max(counts.values()), comment)]
-    # By the share: not every method has run every scene.
+    # The fewest scenes are those of the smallest share, because not every method has run every
+    # scene.
     shares = {method: good[method] / max(counts[method], 1) for method in methods}
     worst = min(methods, key=lambda method: shares[method])
     if good[worst] < best:
@@ -108,7 +109,7 @@ def ranking(compared: Sequence[SuiteRun], methods: Sequence[str]) -> list[Markup
 
 
 def _false_successes(runs: Sequence[SuiteRun]) -> Markup:
-    """Return a sentence on the wrong results for which the engines reported success."""
+    """Return a sentence on the number of wrong results for which the engines reported success."""
     claimed = sum(run.false_success for run in runs)
     if not claimed:
         return Markup("No engine reported success for a wrong result.")
@@ -120,14 +121,14 @@ def _false_successes(runs: Sequence[SuiteRun]) -> Markup:
 def _map(
     report: Report, runs: Sequence[SuiteRun], scenes: Mapping[str, str], methods: Sequence[str]
 ) -> PageTable:
-    """Return a table with a row per scene and a column per method.
+    """Return the map: a table of outcomes with a row for each scene and a column for each method.
 
     Parameters
     ----------
-    report : has the titles of the scenes.
-    runs : of the suite.
-    scenes : files of the scenes' pages by name.
-    methods : names of the methods that are shown.
+    report : the open results file, with the titles of the scenes.
+    runs : runs of the suite.
+    scenes : file of each scene's page by the name of the scene.
+    methods : names of the methods that the table shows.
     """
     by_place = {(run.scene, run.method): run for run in runs}
     rows: list[Row] = []
@@ -142,7 +143,7 @@ def _map(
 
 
 def _status_cell(run: SuiteRun) -> TableCell:
-    """Return the cell of a run: the symbol of its outcome, with the reason as its title."""
+    """Return a cell with the symbol of a run's outcome; the cell's title has the reason."""
     symbol, words = OUTCOMES[run.outcome]
     if run.false_success:
         symbol, words = f"{symbol}!", f"{words}; the engine reported success"
@@ -159,7 +160,7 @@ def _status_cell(run: SuiteRun) -> TableCell:
 
 
 def _key(runs: Sequence[SuiteRun]) -> Note:
-    """Return the explanation of the symbols that are in the map, and of no others."""
+    """Return a note that explains the symbols that occur in the map."""
     used = {run.outcome for run in runs}
     key = [f"{symbol} {words}" for outcome, (symbol, words) in OUTCOMES.items() if outcome in used]
     if any(run.false_success for run in runs):
@@ -168,7 +169,7 @@ def _key(runs: Sequence[SuiteRun]) -> Note:
 
 
 def _counts(runs: Sequence[SuiteRun]) -> list[Element]:
-    """Return a table of the number of ok runs of each method, and a note on what is counted."""
+    """Return a table with the number of ok runs of each method, and a note on its rules."""
     counted = suite_table(runs)
     rows: list[Row] = [(method_cell(method), *cells) for method, *cells in counted.rows]
     head = ("Method", *counted.head[1:-1], "Wrong, but reported as success")

@@ -1,4 +1,7 @@
-"""Compute the data that `templates/viewer.js` draws: bodies, and angles at equally spaced times."""
+"""Compute the data of the animation: blades, and angles at equally spaced times.
+
+The script `templates/viewer.js` draws them.
+"""
 
 from __future__ import annotations
 
@@ -15,27 +18,31 @@ from rotor_mbs.runs.read import StoredRun, StoredScene
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.trajectory import Array
 
-# So many that a page can be sent by mail; a run with fewer samples has a frame for each.
+# Largest number of frames. It limits the size of a page, so that the page can be sent by mail. A
+# run with fewer samples has as many frames as samples.
 MAX_FRAMES = 2401
-# rad from a frame to the next; beyond it the page says that it interpolates.
+# If an angle changes by more than this (rad) from a frame to the next, the page says that the
+# animation interpolates.
 _COARSE = 0.5 * math.pi
-_DECIMALS = 4  # of an angle in rad: a pixel at the tip on any screen
-_VISIBLE = 0.1  # share of the longest blade's length
+_DECIMALS = 4  # decimals of angles in rad: the error at the tip is below a pixel on any screen
+# The largest distance of a tip from its pitch axis is drawn as this share of the longest blade.
+_VISIBLE = 0.1
 
 
 def viewer(stored: StoredScene, runs: Mapping[str, StoredRun]) -> dict[str, Any] | None:
-    """Return the data of the moving rotor for the template; None without angles of any run.
+    """Return the data of the animation for the template; None if no run has angles.
 
     Parameters
     ----------
-    stored : the scene, with the bodies.
-    runs : at most two, by the name to be shown. A run without finite angles for two samples is left
-        out, and what follows its first sample that is not finite.
+    stored : the scene, with the blades.
+    runs : at most two runs, by the names that are shown. The samples of a run from its first sample
+        that is not finite on are left out. A run with fewer than two other samples is left out.
 
     Returns
     -------
     dict or None
-        data (JSON for the script), models (names), magnified (see `magnification`), notes.
+        "data" (JSON for the script), "models" (names), "magnified" (see `magnification`), and
+        "notes" (texts).
     """
     scene = stored.scene
     moves: dict[str, tuple[Array, Array]] = {}
@@ -44,13 +51,13 @@ def viewer(stored: StoredScene, runs: Mapping[str, StoredRun]) -> dict[str, Any]
         if time is None or angles is None or angles.shape != (len(time), 1 + len(scene.blades)):
             continue
         good = np.isfinite(time) & np.isfinite(angles).all(axis=1)
-        # Samples up to the first one that is not finite.
+        # Number of samples before the first one that is not finite.
         count = len(good) if good.all() else int(good.argmin())
         if count >= 2:
             moves[name] = time[:count], angles[:count]
     if not moves:
         return None
-    # Both runs have frames at the same times, up to the end of the longer one.
+    # The frames of both runs have the same step, which divides the time of the longer run equally.
     longest = max((time for time, _ in moves.values()), key=lambda time: float(time[-1]))
     if longest[-1] <= 0.0:
         return None
@@ -89,31 +96,32 @@ def viewer(stored: StoredScene, runs: Mapping[str, StoredRun]) -> dict[str, Any]
 
 
 def angles_at(time: Array, angles: Array, step: float) -> Array:
-    """Return the angles at 0, step, 2 step, ... s, interpolated between samples.
+    """Return the angles at 0, step, 2 step, ... s, linearly interpolated between samples.
 
     Parameters
     ----------
-    time : (n,) s.
+    time : (n,) times of the samples, s.
     angles : (n, coordinates) rad.
-    step : from a frame to the next, s.
+    step : time from a frame to the next, s.
 
     Returns
     -------
     (frames, coordinates) ndarray
         Angles, rad.
     """
-    # The quotient may lie below a whole number by its rounding alone; the last time is then limited
-    # to that of the last sample.
+    # The quotient may be slightly below a whole number because of rounding. A small number is added
+    # before it is rounded down. The last frame might then be later than the last sample. Its time
+    # is therefore limited.
     count = math.floor(float(time[-1]) / step + 1e-9) + 1
     at = np.minimum(np.arange(count) * step, time[-1])
     return np.stack([np.interp(at, time, column) for column in angles.T], axis=1)
 
 
 def magnification(scene: Scene) -> int | None:
-    """Return the factor by which distances of the tips from their pitch axes are magnified.
+    """Return the factor by which the distances of the tips from their pitch axes are magnified.
 
-    The largest is drawn as a tenth of the longest blade, and never smaller than it is. None: the
-    tips lie on the axes.
+    With this factor the largest distance is a tenth of the length of the longest blade. The factor
+    is at least 1. None is returned if all tips are on the axes.
     """
     offset = max(math.hypot(*blade.tip[:2]) for blade in scene.blades)
     if not offset:
