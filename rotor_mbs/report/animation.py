@@ -23,28 +23,29 @@ from rotor_mbs.solution.trajectory import Array
 
 SUFFIXES = (".webp", ".gif")
 RATE = 20  # frames a second, in real time
-_MARK = b"rotor_mbs animation"  # in the metadata of every file
-_MAX_FRAMES = 600  # a longer scene is shown faster
-_PATH_POINTS = 4  # points of a path per frame
+_MARK = b"rotor_mbs animation"  # text in the metadata of each animation, which identifies it
+_MAX_FRAMES = 600  # largest number of frames; a scene that needs more is shown faster
+_PATH_POINTS = 4  # number of points of a path for each frame
 
 
 def write_animation(results: Path, name: str, output: Path, magnified: float | None = None) -> Path:
-    """Write a scene of a results file as an animation, and return its file.
+    """Write a scene of a results file as an animation, and return the path of the animation.
 
     Parameters
     ----------
-    results, name : the file, and the name of the scene in it, or of the TOML file of the scene.
-    output : the animation; its suffix gives the format.
-    magnified : how many times the tip's distance from the pitch axis is drawn; None: so many that
-        it is visible.
+    results : the results file.
+    name : name of the scene in the results file, or name of the TOML file of the scene.
+    output : path of the animation. Its suffix determines the format.
+    magnified : factor by which the tips' distances from the pitch axes are magnified; None for a
+        factor that makes them visible.
 
     Raises
     ------
     InputError
-        For a scene that the file does not have, a format that cannot be made, or a scene without
-        angles.
+        If the file does not have the scene, the suffix is not one of SUFFIXES, the scene has no
+        angles, or `output` is an existing file that is not an animation of this program.
     StoreError
-        Where a file cannot be read or written.
+        If a file cannot be read or written.
     """
     kind = output.suffix.lower()
     if kind not in SUFFIXES:
@@ -82,21 +83,22 @@ def write_animation(results: Path, name: str, output: Path, magnified: float | N
 
 
 def frames(stored: StoredScene, magnified: float | None) -> Iterator[Image.Image]:
-    """Return an iterator over the pictures of a scene's animation, runs side by side.
+    """Return an iterator over the pictures of a scene's animation, with the runs side by side.
 
-    A picture has the paths of the tips up to its time, and the blades. A run that ended before
-    stands still in its last state.
+    A picture has the blades at its time, and the paths of the tips until then. A run that ended
+    earlier is drawn in its last state.
 
     Parameters
     ----------
-    stored : the scene; the runs of its printed and corrected model that have angles are drawn.
-    magnified : how many times the tips' distances from the pitch axes are drawn; None: as many as
-        on the scene's page. It has no effect where the tips lie on the axes.
+    stored : the scene. The runs of its printed and its corrected model are drawn, if they have
+        angles.
+    magnified : factor by which the tips' distances from the pitch axes are magnified; None for the
+        factor on the scene's page. It has no effect if all tips are on the axes.
 
     Raises
     ------
     InputError
-        Where no run has angles.
+        If neither run has angles.
     """
     scene = stored.scene
     runs = {label_of(run.method): run for run in stored.sides.values() if "angles" in run}
@@ -104,7 +106,8 @@ def frames(stored: StoredScene, magnified: float | None) -> Iterator[Image.Image
         raise InputError(f"{stored.name}: nothing to plot: no angles")
     end = min(max(float(run.array("time")[-1]) for run in runs.values()), scene.duration)
     count = max(2, min(round(end * RATE) + 1, _MAX_FRAMES))
-    # Times of the points of the paths: so many for each frame that paths are smooth.
+    # Times of the points of the paths. A path has several points for each frame, so that it is
+    # smooth.
     at = np.linspace(0.0, end, (count - 1) * _PATH_POINTS + 1)
     needed = magnification(scene)
     factor = 1.0 if needed is None else float(magnified or needed)
@@ -120,14 +123,14 @@ def frames(stored: StoredScene, magnified: float | None) -> Iterator[Image.Image
             colour = coordinate_look(blade + 1).colour
             paths += axes.plot([], [], color=colour, linewidth=0.8)
             blades += axes.fill([0.0], [0.0], facecolor="#dddddd", edgecolor=colour, linewidth=2.2)
-        # After its last sample a run stands still.
+        # Number of times up to the last sample of the run.
         ended = int(np.searchsorted(at, run.array("time")[-1], side="right"))
         moving.append((axes, name, corners, ended, paths, blades))
     offset = f", offset drawn ×{factor:g}" if factor != 1.0 else ""
     clock = panels.figure.text(0.01, 0.93, "", color=GREY)
 
     def picture(frame: int) -> Image.Image:
-        """Draw a frame; a run that ended before stays where it ended."""
+        """Draw the picture at a place in `at`, and return it."""
         for axes, name, corners, ended, paths, blades in moving:
             last = min(frame, ended - 1)
             axes.set_title(
@@ -146,23 +149,26 @@ def frames(stored: StoredScene, magnified: float | None) -> Iterator[Image.Image
 
 
 def wires(scene: Scene, time: Array, angles: Array, at: Array, magnified: float) -> Array:
-    """Return the places in the picture of three corners of each blade.
+    """Return the positions in the picture of three corners of each blade.
+
+    The corners of a blade are the point of the pitch axis beside the tip, the tip, and a point near
+    the hub that has the tip's distance from the pitch axis.
 
     Parameters
     ----------
-    scene : of the run.
-    time, angles : (n,) s and (n, coordinates) rad, its samples.
-    at : (times,) s, of the pictures; between samples the angles are interpolated.
-    magnified : how many times the distances from the pitch axis are drawn.
+    scene : scene of the run.
+    time, angles : (n,) s and (n, coordinates) rad, the samples of the run.
+    at : (times,) times of the positions, s. The angles are interpolated between samples.
+    magnified : factor by which distances from the pitch axis are magnified.
 
     Returns
     -------
     (times, blades, 3, 2) ndarray
-        The end of the pitch axis, the tip, and a point at the hub as far from the pitch axis as the
-        tip, m.
+        Positions of the corners, to the right and up, m.
     """
     moved = np.stack([np.interp(at, time, column) for column in angles.T], axis=1)
-    # Each corner as the tip of blades that have their tip there.
+    # `tip_paths` computes the paths of tips. Each corner is therefore computed as the tip of blades
+    # that end there.
     corners = []
     for across, along in ((0.0, 1.0), (magnified, 1.0), (magnified, 0.06)):
         blades = []

@@ -1,4 +1,7 @@
-"""Draw with matplotlib, which no other module imports: panels, styles, reproducible files."""
+"""Draw with matplotlib: panels, styles, and files that are the same every time.
+
+No other module imports matplotlib.
+"""
 
 from __future__ import annotations
 
@@ -26,11 +29,11 @@ from rotor_mbs.scenario.toml_file import file_path
 
 @contextmanager
 def _unaffected_by_environment() -> Iterator[None]:
-    """Import matplotlib in the block whatever the environment says of backends and folders.
+    """Make the import of matplotlib in the block independent of the environment.
 
-    No backend is needed here, and an unknown one in MPLBACKEND would be an error. matplotlib warns
-    in every process about a home that cannot be written, though it then uses a temporary folder;
-    the block suppresses this warning.
+    The block removes MPLBACKEND, because an unknown backend in it would be an error, and no backend
+    is needed here. It also suppresses a warning: if the home folder cannot be written, matplotlib
+    uses a temporary folder, but warns about it in every process.
     """
     backend = os.environ.pop("MPLBACKEND", None)
     logger = logging.getLogger("matplotlib")
@@ -50,17 +53,18 @@ with _unaffected_by_environment():
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
     from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
-if _is_imported_here and os.environ.get("MPLBACKEND"):  # for other drawings of this process
+# Other code of this process that draws with matplotlib still gets the backend of MPLBACKEND.
+if _is_imported_here and os.environ.get("MPLBACKEND"):
     with suppress(ValueError):
         matplotlib.rcParams["backend"] = os.environ["MPLBACKEND"]
 
-WIDTH = 5.2  # in; on a telephone's 360 px a text of 9.5 points is then 9 px high
+WIDTH = 5.2  # in; a text of 9.5 points is then 9 px high on a telephone with 360 px
 TIME_AXIS, SPEED_AXIS, RPM_AXIS = "time (s)", "rotor speed (rad/s)", "rotor speed (rpm)"
-PRINT_WIDTH = 174.0 / 25.4  # in; two columns of a journal
+PRINT_WIDTH = 174.0 / 25.4  # in; width of a journal's page with two columns
 _LEGEND_COLUMNS = 2
-MARK = b"rotor_mbs pictures"  # in the metadata of every picture that is a file
+MARK = b"rotor_mbs pictures"  # text in the metadata of each picture, which identifies it
 KINDS = ("pdf", "svg", "png")
-_PAGE_STYLE, _PRINT_STYLE = (  # without matplotlib's defaults
+_PAGE_STYLE, _PRINT_STYLE = (  # the files' own settings, without matplotlib's defaults
     matplotlib.rc_params_from_file(
         Path(__file__).with_name(f"{name}.mplstyle"), use_default_template=False
     )
@@ -70,7 +74,11 @@ _PAGE_STYLE, _PRINT_STYLE = (  # without matplotlib's defaults
 
 @dataclass(frozen=True)
 class Panels:
-    """A matplotlib figure and its axes, from top to bottom, which a notebook shows as SVG."""
+    """A matplotlib figure, which a notebook shows as SVG.
+
+    figure : the figure.
+    axes : axes of the figure, from top to bottom; in a grid, row by row.
+    """
 
     figure: Figure
     axes: list[Any]
@@ -79,7 +87,7 @@ class Panels:
         return encoded(self.figure, "svg", for_print=False).decode()
 
     def labelled(self) -> dict[str, Any]:
-        """Return the first artist of each label, in drawing order."""
+        """Return the first artist of each label by the label, in the order of drawing."""
         artists: dict[str, Any] = {}
         for axes in self.figure.axes:
             for artist, label in zip(*axes.get_legend_handles_labels(), strict=True):
@@ -101,19 +109,20 @@ class Panels:
             )
         rows = math.ceil(len(artists) / _LEGEND_COLUMNS)
         height = float(self.figure.get_figheight())
-        # The legend's height is the same in every figure; of a high one a fraction would be empty.
+        # The margin is a number of inches, because the legend has the same height in every figure.
         self.figure.subplots_adjust(top=1.0 - (0.2 + 0.19 * rows) / height)
         return self
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Save the figure as PDF, SVG or PNG, by the ending of `path`.
+        """Save the figure as PDF, SVG or PNG, as the suffix of `path` requires.
 
         Raises
         ------
         InputError
-            For another ending.
+            If the suffix is another one, or `path` is an existing file that is not a picture of
+            this program.
         StoreError
-            Where the file cannot be written.
+            If the file cannot be written.
         TypeError
             If `path` is neither text nor a path.
         """
@@ -130,7 +139,7 @@ def panels(heights: tuple[float, ...], x_label: str) -> Panels:
 
     Parameters
     ----------
-    heights : of the panels, in, the top one first.
+    heights : heights of the panels from top to bottom, in.
     x_label : label of the horizontal axis, below the last panel.
     """
     figure = Figure(figsize=(WIDTH, sum(heights) + 0.6), facecolor="white")
@@ -139,7 +148,7 @@ def panels(heights: tuple[float, ...], x_label: str) -> Panels:
             :, 0
         ].tolist()
         axes[-1].set_xlabel(x_label)
-    # Fixed margins: the layout does not depend on the fonts.
+    # The margins are fixed, so that the layout does not depend on the fonts.
     height = float(figure.get_figheight())
     figure.subplots_adjust(
         left=0.16, right=0.965, bottom=0.45 / height, top=1.0 - 0.15 / height, hspace=0.09
@@ -148,12 +157,12 @@ def panels(heights: tuple[float, ...], x_label: str) -> Panels:
 
 
 def grid(rows: int, columns: int, height: float) -> Panels:
-    """Build axes for a manuscript, row by row, at a journal's page width.
+    """Build a grid of axes for a manuscript. The figure is as wide as a journal's page.
 
     Parameters
     ----------
-    rows, columns : number of axes in each direction.
-    height : of each of them, in.
+    rows, columns : number of rows and of columns.
+    height : height of each row, in.
     """
     with style(for_print=True):
         whole = rows * height + 1.25
@@ -169,7 +178,7 @@ def grid(rows: int, columns: int, height: float) -> Panels:
 def squares(count: int) -> Panels:
     """Build `count` axes side by side with equal scales and no frame.
 
-    Each has 420 by 420 pixels; above them is room for two lines of text.
+    Each has 420 by 420 pixels. There is room for two lines of text above them.
     """
     with style():
         figure = Figure(figsize=(4.2 * count, 4.6), dpi=100, facecolor="white")
@@ -183,28 +192,28 @@ def squares(count: int) -> Panels:
 
 
 def pixels(figure: Figure) -> NDArray[np.uint8]:
-    """Return the figure as it is now as an image, (height, width, 3): red, green and blue."""
+    """Return an image of the figure, (height, width, 3), with values of red, green and blue."""
     canvas: Any = FigureCanvasAgg(figure)
     canvas.draw()
     return np.asarray(canvas.buffer_rgba())[..., :3]
 
 
 def style(*, for_print: bool = False) -> AbstractContextManager[None]:
-    """Return a context with the style of the pages, or that of manuscripts, for drawing."""
+    """Return a context in which matplotlib draws in the style of pages, or of manuscripts."""
     return matplotlib.rc_context(_PRINT_STYLE if for_print else _PAGE_STYLE)
 
 
 def encoded(
     figure: Figure, kind: str, *, for_print: bool = True, title: str = "", description: str = ""
 ) -> bytes:
-    """Return the figure as a file, the same bytes every time.
+    """Return the content of a file with the figure, which has the same bytes every time.
 
     Parameters
     ----------
-    figure : what is drawn.
-    kind : one of KINDS.
-    for_print : whether in the style of manuscripts, with the mark of this program's files.
-    title, description : metadata of the file; "" for none.
+    figure : the figure.
+    kind : format, one of KINDS.
+    for_print : whether the file has the style of manuscripts, and MARK in its metadata.
+    title, description : texts for the metadata; "" for none.
     """
     metadata: dict[str, Any] = {
         "pdf": {"CreationDate": None},
@@ -220,7 +229,7 @@ def encoded(
     with (
         style(for_print=for_print),
         np.errstate(over="ignore", invalid="ignore"),
-    ):  # a divergence has numbers that overflow
+    ):  # the numbers of a divergence may overflow
         stream = io.BytesIO()
         figure.savefig(stream, format=kind, metadata=metadata)
     return stream.getvalue()
@@ -231,21 +240,21 @@ def log_axis(axes: Any, lowest: float, highest: float) -> None:
 
     Parameters
     ----------
-    axes : of matplotlib.
+    axes : axes of matplotlib.
     lowest, highest : positive values that the axis includes.
     """
     low, high = math.floor(math.log10(lowest)), math.ceil(math.log10(highest))
     high = max(high, low + 1)
-    # The limits first: a range found by the axes themselves may overflow.
+    # The limits are set together with the scale, because limits that matplotlib finds may overflow.
     axes.set(ylim=(10.0**low, 10.0**high), yscale="log")
     exponents = range(low, high + 1, max(1, math.ceil((high - low) / 7)))
     ticks(axes.yaxis, {10.0**e: power(e) for e in exponents})
 
 
 def ticks(axis: Any, labels: Mapping[float, str]) -> None:
-    """Label an axis at the places of `labels` and no others.
+    """Set the ticks of an axis to the values of `labels`, with their texts.
 
-    `set_ticks` would make objects for all of them at once, which is slow.
+    `set_ticks` is not used, because it is slow: it makes the objects of all ticks at once.
     """
     axis.set_major_locator(FixedLocator([*labels]))
     axis.set_major_formatter(FuncFormatter(lambda value, _: labels.get(value, "")))
@@ -253,14 +262,15 @@ def ticks(axis: Any, labels: Mapping[float, str]) -> None:
 
 
 def curve(axes: Any, x: Any, y: Any, look: Look, width: float = 1.2, **more: Any) -> None:
-    """Draw a line, with its label in the legend, and with markers that are white inside.
+    """Draw a curve. Its markers, if it has any, are white inside.
 
     Parameters
     ----------
-    axes : of matplotlib.
-    x, y : (n,) each.
-    look : colour, line, marker, and label; "" for none in the legend.
-    width : of the line, points.
+    axes : axes of matplotlib.
+    x, y : (n,) coordinates of the points.
+    look : colour, line, marker and label of the curve. A curve with the label "" is not in the
+        legend.
+    width : width of the line, points.
     more : further options of matplotlib's `plot`.
     """
     axes.plot(

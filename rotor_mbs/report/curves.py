@@ -1,4 +1,7 @@
-"""Store the numbers of a page's plots: columns in single precision, each once, in base64."""
+"""Store the numbers of a page's plots as columns in single precision, encoded in base64.
+
+Equal columns are stored once.
+"""
 
 from __future__ import annotations
 
@@ -10,23 +13,26 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-# Where values exceed their range by this factor, as a rotor angle after an hour does, single
-# precision would show steps: the difference from the first value is stored.
+# If the largest magnitude of the values exceeds their range by this factor, a curve in single
+# precision would have visible steps. A rotor angle after an hour is an example. The differences
+# from the first value are then stored.
 _FAR_FROM_ZERO = 1000.0
-_LONG = 2000  # samples; a longer column may be thinned. About two per pixel of a page
-# About the largest number of single precision.
-_LARGEST = 3.0e38
+# A column with at most this number of samples is always stored whole. The number is about two for
+# each pixel of a page.
+_LONG = 2000
+_LARGEST = 3.0e38  # largest magnitude that is stored; single precision ends at 3.4e38
 
 
 class CurveStore:
-    """Columns of numbers for the script of a page.
+    """The columns of numbers that the script of a page draws.
 
-    The description of a column tells where it lies. "at" is [first, count], in numbers from the
-    beginning; for a table of several runs [first, count, stride], with the stride from a run to the
-    next. "from", if there is one, is a number to be added to each value.
+    A column is described by a dict. Its entry "at" is [first, count]: the index of the first number
+    of the column among all stored numbers, and how many there are. For a table of several runs it
+    is [first, count, stride], where stride is the distance from the first number of a run to that
+    of the next run. The entry "from", if there is one, is a number to be added to each value.
 
-    every : of long columns only one in so many samples is stored, so that a page does not become
-    too large.
+    every : if it is n, only every n-th sample of long columns is stored, which limits the size of
+        the page.
     """
 
     def __init__(self, every: int = 1) -> None:
@@ -36,17 +42,17 @@ class CurveStore:
         self.size = 0
 
     def add(self, values: NDArray[Any] | Sequence[float]) -> dict[str, Any]:
-        """Store a column, or the rows of a table, and return its description.
+        """Store a column or a table, and return its description.
 
         Parameters
         ----------
-        values : (n,) the column; or (runs, n), of which the page shows one row at a time. NaN is a
-            gap.
+        values : (n,) a column; or (runs, n) a table, of which the page shows one row at a time. NaN
+            is a gap.
 
         Returns
         -------
         dict
-            Where the numbers lie and what is added to them, see the class.
+            The entries "at" and "from"; see the class.
         """
         table = np.asarray(values, dtype=np.float64)[..., :: self.step(values)]
         count = int(table.shape[-1])
@@ -56,7 +62,7 @@ class CurveStore:
             origin = float(known[0])
         with np.errstate(invalid="ignore"):
             column = np.clip(table - origin, -_LARGEST, _LARGEST).astype("<f4").ravel()
-        # The limits make infinities finite; they are gaps, as NaN is.
+        # `clip` made infinite values finite. They are made NaN again, because they are gaps.
         column[~np.isfinite(table.ravel())] = np.nan
         # Columns of equal numbers, such as the times of several plots, are stored once.
         digest = hashlib.sha256(column.tobytes()).digest()
@@ -71,7 +77,7 @@ class CurveStore:
         return place
 
     def step(self, values: NDArray[Any] | Sequence[float]) -> int:
-        """Return how many samples of a column make one that is stored: 1 for a short column."""
+        """Return n if only every n-th sample of a column is stored; 1 for a short column."""
         return self.every if np.shape(values)[-1] > _LONG else 1
 
     def text(self) -> str:
@@ -82,15 +88,16 @@ class CurveStore:
 
 
 def extremes(values: Any, most: int) -> NDArray[np.int64]:
-    """Return the indices of the samples to draw, ascending.
+    """Return the indices, ascending, of the samples that are drawn if a curve has too many.
 
-    They are the ends, and the smallest and the largest finite sample of equal intervals, so that no
-    peak is lost.
+    They are the first and the last sample, and the smallest and the largest finite sample of each
+    of many equally long intervals, so that no peak is lost.
 
     Parameters
     ----------
-    values : (n,).
-    most : approximate number of samples; where there are no more, all are returned.
+    values : (n,) values of the curve.
+    most : approximate largest number of samples that are drawn. If there are no more, all indices
+        are returned.
     """
     count = len(values)
     if count <= most:
@@ -98,11 +105,13 @@ def extremes(values: Any, most: int) -> NDArray[np.int64]:
     lengths = np.full(most // 2, count // (most // 2))
     lengths[: count % len(lengths)] += 1
     ends = lengths.cumsum()
-    # The samples of each interval; a shorter one has its last sample twice.
+    # Indices of the samples by interval. Lengths differ by at most one; in a shorter interval the
+    # last sample occurs twice.
     intervals = np.minimum((ends - lengths)[:, None] + np.arange(lengths[0]), ends[:, None] - 1)
     known = np.isfinite(values[intervals])
     chosen = [0, count - 1]
-    # Two samples of each; NaN is replaced by what is never the smallest or the largest.
+    # Two samples of each interval: the smallest, for which samples that are not finite are replaced
+    # by infinity, and the largest, for which they are replaced by minus infinity.
     for replaced, place in ((np.inf, np.argmin), (-np.inf, np.argmax)):
         found = place(np.where(known, values[intervals], replaced), axis=1)
         chosen += intervals[np.arange(len(ends)), found].tolist()

@@ -1,8 +1,9 @@
 """Write the paper's figures as files for a manuscript.
 
-A figure has the printed model, the corrected one, and how far the printed one and an independent
-computation are from it; it has a title, a description, and a caption in a file beside it. Scenes
-that are not the paper's, or were changed, have a figure of the same layout.
+A figure has a column for the printed model, one for the corrected model, and one for the
+differences of the printed model and of an independent computation from the corrected model. Its
+file has a title and a description; a text file beside it has the caption. Scenes that are not the
+paper's, or were changed, have a figure of the same layout.
 """
 
 from __future__ import annotations
@@ -36,24 +37,28 @@ from rotor_mbs.runs.versions import made_with
 from rotor_mbs.scenario.scene import scene_tables
 from rotor_mbs.solution.trajectory import Array
 
-DIFFERENCE = "Difference"  # from the corrected model; the caption says so
-REFERENCE_HEADING = "Motion"  # of a scene without a printed model, in which nothing was corrected
+# Heading of the column of differences. The caption says from which model they are taken.
+DIFFERENCE = "Difference"
+# Heading of the column of the corrected model in a scene without a printed model, in which nothing
+# was corrected.
+REFERENCE_HEADING = "Motion"
 _PAPER = "Aguilar-Acevedo et al., Revista UIS Ingenierías 19(1), 25-36, 2020"
-_LEGEND_HEIGHT = 0.95  # in, of a legend of two lines with the label of the axis above
-_LOWEST = 1e-17  # rad, m: a smaller difference is a gap on the logarithmic axis
+# in; room for a legend of two lines and the label of the axis above it
+_LEGEND_HEIGHT = 0.95
+_LOWEST = 1e-17  # rad, rad/s, m; differences up to this value are gaps on the logarithmic axis
 
 
 # ---- Drawing
 
 
 def draw(figure: PaperFigure, axes: Sequence[Any], runs: Mapping[str, StoredRun]) -> None:
-    """Draw one model of a figure.
+    """Draw the runs of one model of a figure.
 
     Parameters
     ----------
-    figure : tells the kind; paths are those of the first run alone.
-    axes : of matplotlib, one for paths, else two, position above velocity.
-    runs : of the model, by label.
+    figure : the figure. If it shows paths, only those of the first run are drawn.
+    axes : axes of matplotlib: one for paths, else two, position above velocity.
+    runs : runs of the model by label.
     """
     if figure.kind == PATHS:
         plots.draw_paths(axes[0], next(iter(runs.values())).array("tip"))
@@ -85,10 +90,11 @@ def draw_differences(
 
     Parameters
     ----------
-    figure : tells the kind.
-    axes : of matplotlib, one for paths, with distances of tips (m), else two, angles (rad) above
-        rates (rad/s); all have a logarithmic axis over time (s).
-    runs : by model, then by label; there is a corrected one.
+    figure : the figure.
+    axes : axes of matplotlib. If the figure shows paths, there is one, for the distances of the
+        tips (m). Otherwise there are two, angles (rad) above rates (rad/s). Their vertical axes
+        become logarithmic.
+    runs : runs by model, then by label. The corrected model has runs.
     """
     names = ("tip",) if figure.kind == PATHS else ("angles", "rates")
     units = {"tip": "tip distance (m)", "angles": "angle (rad)", "rates": "rate (rad/s)"}
@@ -123,13 +129,14 @@ def draw_differences(
 
 
 def differences(name: str, run: StoredRun, other: StoredRun) -> Array:
-    """Return the size of the difference of two runs at the samples that both have, (n,).
+    """Return the difference of two runs at each sample that both have, (n,).
 
     Parameters
     ----------
-    name : "tip", of which it is the largest distance (m) of any blade; else "angles" or "rates",
-        the largest over the coordinates (rad, rad/s).
-    run, other : runs of one scene.
+    name : quantity that is compared. For "tip" a difference is the largest distance of a blade's
+        tips, m. For "angles" or "rates" it is the largest difference over the coordinates, rad or
+        rad/s.
+    run, other : runs of the same scene.
     """
     n = min(run.samples, other.samples)
     gap = run.array(name)[:n] - other.array(name)[:n]
@@ -139,14 +146,15 @@ def differences(name: str, run: StoredRun, other: StoredRun) -> Array:
 
 
 def composed(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> canvas.Panels:
-    """Return the whole figure: a column per model, and one for the differences.
+    """Return a figure with a column for each model and a column for the differences.
 
-    Position is above velocity; of paths there is a row per panel.
+    A figure of paths has a row for each panel. Other figures have two rows, position above
+    velocity.
 
     Parameters
     ----------
-    figure : to be drawn; some run of its scenes is stored.
-    scenes : by name, with the runs.
+    figure : the figure. At least one run of its scenes is stored.
+    scenes : stored scenes by name.
     """
     pictures = panel_runs(figure, scenes)
     keys = [key for key in HEADINGS if any(key in row for row in pictures.values())]
@@ -171,11 +179,12 @@ def composed(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> canvas.P
             headings.append(DIFFERENCE)
         for axes, text in zip(table[0], headings, strict=True):
             axes.text(0.5, heading, text, transform=axes.transAxes, ha="center", weight="bold")
-        # A model that a panel has no run of leaves its axes empty.
+        # If a panel has no run of a model, the axes of this model are empty. They are hidden.
         for axes in panels.axes:
             if not axes.has_data():
                 axes.set_axis_off()
-        for row in table:  # labels of the vertical axis are in the first column alone
+        # Only the first column and that of the differences have labels of the vertical axis.
+        for row in table:
             for axes in row[1 : len(keys)]:
                 axes.set_ylabel("")
         for row, letter in zip(table, pictures if is_paths else (), strict=False):
@@ -191,11 +200,15 @@ def composed(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> canvas.P
     return panels
 
 
-# ---- What a figure says of itself
+# ---- Titles and captions
 
 
 def title_of(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> str:
-    """Return the title of a figure: which one of the paper it recomputes, else of its scene."""
+    """Return the title of a figure.
+
+    It names the figure of the paper that is recomputed. The title of any other figure is that of
+    its scene.
+    """
     if figure.number:
         return f"Figure {figure.number} of {_PAPER}, recomputed"
     scene = scenes[figure.panels[0][1]]
@@ -205,13 +218,13 @@ def title_of(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> str:
 def caption_of(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> str:
     """Return the caption of a figure, several lines.
 
-    It says what is shown, the scenes, by which methods with which settings, and which of them is
-    right. A model is called right where the status of each of its runs is ok.
+    The caption says what is shown, for which scenes, by which methods with which settings, and
+    which models are right. A corrected model is called right if all its runs have the status ok.
 
     Parameters
     ----------
     figure : the figure.
-    scenes : by name, with the runs.
+    scenes : stored scenes by name.
     """
     pictures = panel_runs(figure, scenes)
     what = {
@@ -282,7 +295,7 @@ def caption_of(figure: PaperFigure, scenes: Mapping[str, StoredScene]) -> str:
 
 
 def _name(scene: StoredScene) -> str:
-    """Return the title and the name of a scene, as a caption has them."""
+    """Return the title and the name of a scene for a caption."""
     return f"{scene.title} (scene {scene.label})"
 
 
@@ -291,10 +304,10 @@ def _scene_line(label: str, scene: StoredScene, *, has_title: bool) -> str:
 
     Parameters
     ----------
-    label : of its panel, "" for the only one.
+    label : label of the scene's panel; "" if the figure has only one.
     scene : the scene.
-    has_title : whether the line begins with title and name; the caption of another figure than the
-        paper's begins with them.
+    has_title : whether the line has the title and the name of the scene. It is false for figures
+        that are not the paper's, whose captions begin with them.
     """
     initial = scene_tables(scene.scene)["initial"]
     angles, rates = (
@@ -317,7 +330,7 @@ def _scene_line(label: str, scene: StoredScene, *, has_title: bool) -> str:
 
 
 def _verdict(runs: Sequence[StoredRun]) -> str:
-    """Return "right" for runs of which every one is ok, else "not verified" with the statuses."""
+    """Return "right" if all runs are ok, else "not verified" with the other statuses."""
     statuses = [run.status.replace("_", " ") for run in runs if run.status != "ok"]
     if not statuses:
         return "right"
@@ -327,25 +340,26 @@ def _verdict(runs: Sequence[StoredRun]) -> str:
 
 
 def _method_line(run: StoredRun) -> str:
-    """Return the method of a run, its name and its settings."""
+    """Return the label, the name and the settings of a run's method, as text."""
     settings = ", ".join(f"{name} = {value}" for name, value in run.settings.items())
     name = f"{with_capital(label_of(run.method))} ({run.method})"
     return f"{name}: {settings}." if settings else f"{name}."
 
 
 def _uncertainty(runs: Iterable[StoredRun]) -> float | None:
-    """Return the largest uncertainty of the angles of these runs, rad; None where none is known.
+    """Return the largest uncertainty of the angles of runs, rad; None if no run has a known one.
 
     Parameters
     ----------
-    runs : of one model.
+    runs : runs of one model.
     """
     known = [
         float(run.array("angle_uncertainty").max())
         for run in runs
         if "angle_uncertainty" in run and run.samples
     ]
-    # Stored in double precision: half a unit in the last place of an angle is its own.
+    # The stored uncertainty does not include the rounding of the angles to double precision, which
+    # is half a unit in the last place.
     angles = [
         float(np.abs(run.array("angles")).max())
         for run in runs
@@ -359,13 +373,13 @@ def _uncertainty(runs: Iterable[StoredRun]) -> float | None:
 def _largest_difference(
     pictures: Mapping[str, Mapping[str, Mapping[str, StoredRun]]],
 ) -> float | None:
-    """Return the largest angle difference of independent runs from corrected ones, rad.
+    """Return the largest angle difference between independent and corrected runs, rad.
 
-    None where no two runs can be compared.
+    None is returned if no two runs can be compared.
 
     Parameters
     ----------
-    pictures : the runs by row, model and label, see `panel_runs`.
+    pictures : runs by row, then by model, then by label; see `panel_runs`.
     """
     largest = []
     for row in pictures.values():
@@ -386,17 +400,18 @@ def write_figures(
 
     Parameters
     ----------
-    results, folder : the results file; where figNN.pdf and figNN.txt, and so on, are written.
+    results : the results file.
+    folder : folder in which the figures are written, such as fig11.pdf with its caption fig11.txt.
     kind : "pdf", "svg" or "png".
-    numbers : of the paper's figures, such as "11", or names of other scenes; all that the file has
-        where none is given.
+    numbers : numbers of the paper's figures, such as "11", or names of other scenes. If none is
+        given, all figures that the file has are written.
 
     Raises
     ------
     InputError
-        For a figure that the file does not have, or a file without angles and rates.
+        If the file does not have one of these figures, or has no run with angles and rates.
     StoreError
-        Where the file cannot be read or the folder cannot be written.
+        If the file cannot be read or the folder cannot be written.
     """
     with open_results(results) as opened:
         known = all_figures(opened.scenes)
@@ -418,7 +433,7 @@ def write_figures(
             if name != "created"
         )
         made: dict[str, bytes] = {}
-        # Numbers of a runaway overflow in a caption or a difference; they are drawn as they are.
+        # The numbers of a divergence may overflow in a caption or a difference, which is no error.
         with np.errstate(over="ignore", invalid="ignore"):
             for name in asked:
                 figure = have[name]

@@ -17,8 +17,9 @@ from rotor_mbs.methods.catalogue import (
 )
 from rotor_mbs.methods.catalogue import label_of as label_of
 
-# Colours by their name in the style sheet, on a light and on a dark page. Curves have a contrast of
-# at least 3 to the card that they are drawn on, texts one of at least 4.5 (a test computes them).
+# Colours by their name in the style sheet, each for light and for dark pages. The contrast of
+# curves to the card on which they are drawn is at least 3, that of texts at least 4.5. A test
+# computes these contrasts.
 PALETTE = {
     "ink": ("#1b1f24", "#e6e9ed"),
     "card": ("#ffffff", "#1c2025"),
@@ -26,8 +27,8 @@ PALETTE = {
     "grid": ("#e4e4e4", "#2a3037"),
     "ring": ("#c8ccd1", "#4d5560"),
     "heat": ("#0b5a8f", "#4fa8e0"),
-    # Models: after Okabe and Ito, distinguishable with colour blindness, darkened where white asks
-    # for it.
+    # Colours of models: those of Okabe and Ito, which people with colour blindness can distinguish.
+    # Some are darkened, because their contrast to white is too small.
     "reference": ("#5793c1", "#477ca6"),
     "blue": ("#0072b2", "#5cb3ec"),
     "navy": ("#1f3f8f", "#9db4ff"),
@@ -38,14 +39,15 @@ PALETTE = {
     "error-1": ("#b0568c", "#f2a3c8"),
     "error-2": ("#8a6a00", "#e3c04a"),
     "error-3": ("#7a5cc2", "#b6a2f7"),
-    # Coordinates: after Tol's muted colours; the rotor, then the blades.
+    # Colours of coordinates, first the rotor, then the blades: derived from Tol's muted colours.
     "rotor": ("#4a5058", "#c9ced4"),
     "blade-1": ("#882255", "#e583b2"),
     "blade-2": ("#2a8a7e", "#62cdbf"),
     "blade-3": ("#5a46b5", "#ab9ff5"),
     "blade-4": ("#8a7a1c", "#d6c75c"),
     "blade-5": ("#b5505f", "#f2a3ae"),
-    # A parameter that is varied, from small to large: viridis, its yellow end darkened.
+    # Colours for the values of a varied parameter, from small to large: viridis with a darkened
+    # yellow end.
     "step-0": ("#440154", "#c08be0"),
     "step-1": ("#46327e", "#9a86e8"),
     "step-2": ("#365c8d", "#7ba6de"),
@@ -63,13 +65,14 @@ INK, PAPER, GREY, RING, BLUE, VERMILLION = (
 COORDINATES = tuple(
     PALETTE[name][0] for name in PALETTE if name == "rotor" or name.startswith("blade-")
 )
-# Names of the light colours; matplotlib's black is that of texts.
+# Names of the light colours. The black of matplotlib's texts counts as "ink".
 _NAMES = {light: name for name, (light, _) in PALETTE.items()} | {"#000000": "ink"}
-# Colours of each model, in the order of the catalogue, for its methods in turn. Further models are
-# grey.
+# Colours of the models in the order of the catalogue. The methods of a model get its colours in
+# turn. Further models are grey.
 _MODEL_COLOURS = (("blue", "navy"), ("brown", "vermillion"), ("green",), ("purple",))
-_ERRATA = (("error-1", "^"), ("error-2", "P"), ("error-3", "h"))  # colour and marker
-# matplotlib's line styles, and what the style sheet calls them.
+# Colour and marker of each method with a single erratum.
+_ERRATA = (("error-1", "^"), ("error-2", "P"), ("error-3", "h"))
+# Names in the style sheet for matplotlib's line styles.
 _DASHES = {"-": "solid", "--": "dashed", "-.": "dashdot", ":": "dotted"}
 LINES = tuple(_DASHES)
 _MARKERS = ("o", "s", "^", "D", "v", "P", "X", "h", "p", "<", ">")
@@ -77,12 +80,12 @@ _MARKERS = ("o", "s", "^", "D", "v", "P", "X", "h", "p", "<", ">")
 
 @dataclass(frozen=True)
 class Look:
-    """A colour, a line and a marker for a curve, in matplotlib's notation.
+    """The look of a curve, in matplotlib's notation.
 
-    colour : such as "#0072b2".
-    line : "-", "--", "-.", ":", or "" for none.
-    marker : "" for none.
-    label : name in a legend; "" for none.
+    colour : colour such as "#0072b2".
+    line : line style: "-", "--", "-.", ":", or "" for no line.
+    marker : marker such as "o"; "" for no marker.
+    label : name of the curve in a legend; "" for no entry.
     """
 
     colour: str
@@ -103,10 +106,11 @@ class Look:
 
 @functools.cache
 def _catalogue_looks() -> dict[str, Look]:
-    """Return the looks of all methods, and of all curves of the bench, by name.
+    """Return the look of each method in the catalogue, and of each curve of the bench, by name.
 
-    A model has its colours, and a line and a marker for each method. Of the corrected models the
-    first method's line is solid, that of the printed equations is dashed.
+    A model has one colour or two. Its methods differ in colour, line style or marker. The line of a
+    corrected model's first method is solid. The line of `printed/ode45` is dashed; other methods
+    with the printed equations have dotted lines.
     """
     looks = {REFERENCE: Look(PALETTE["reference"][0], "-", "*"), PRINTED: Look(INK, "--", "o")}
     for (colour, marker), method in zip(_ERRATA, errata_methods().values(), strict=False):
@@ -124,7 +128,7 @@ def _catalogue_looks() -> dict[str, Look]:
         place, turn = models.setdefault(model, len(models)), counts[model]
         colours = _MODEL_COLOURS[place] if place < len(_MODEL_COLOURS) else ("grey",)
         marker = _MARKERS[(turn + 3 * place) % len(_MARKERS)]
-        # A model's colours in turn with one line style, then with the next.
+        # All colours of a model are used with one line style before the next style is used.
         line = list(_DASHES)[turn // len(colours) % len(_DASHES)]
         looks[curve] = Look(PALETTE[colours[turn % len(colours)]][0], line, marker)
         counts[model] += 1
@@ -132,13 +136,14 @@ def _catalogue_looks() -> dict[str, Look]:
 
 
 def look_of(curve: str) -> Look:
-    """Return how a method, or a curve of the bench, is drawn.
+    """Return the look of a method, or of a curve of the bench.
 
-    One that is not in the catalogue is grey; its line and marker follow from its name.
+    If the name is not in the catalogue, the colour is grey, and the line and the marker are derived
+    from the name.
     """
     look = _catalogue_looks().get(curve)
     if look is None:
-        # Not by hash(), which differs from process to process.
+        # `hash` is not used, because its result differs from process to process.
         code = zlib.crc32(curve.encode("utf-8", "replace"))
         look = Look(GREY, list(_DASHES)[code % 4], _MARKERS[code // 4 % len(_MARKERS)])
     return replace(look, label=label_of(curve))
@@ -153,23 +158,28 @@ def coordinate_look(index: int, label: str = "") -> Look:
 
 
 def step_look(place: int, count: int, label: str) -> Look:
-    """Return the look of one of the curves for the values of a varied parameter.
+    """Return the look of the curve for one value of a varied parameter.
 
-    place : of the value, from 0, in ascending order; count : of the values.
+    Parameters
+    ----------
+    place : index of the value in ascending order, from 0.
+    count : number of values.
+    label : label of the curve.
     """
     step = round(place * (STEPS - 1) / max(count - 1, 1)) if count > 1 else 0
     return Look(PALETTE[f"step-{step}"][0], ("-", "--", "-.", ":")[place // STEPS % 4], "", label)
 
 
 def name_of_colour(colour: str) -> str:
-    """Return the name of a colour of the light palette, such as "blade-1"; "" for another."""
+    """Return the name of a colour of the light palette, such as "blade-1"; "" for other colours."""
     return _NAMES.get(colour, "")
 
 
 def palette_css() -> str:
     """Return the palette as a style sheet.
 
-    It has a variable for each colour, for light and dark pages, and a class that draws in it.
+    The style sheet has a variable for each colour, with values for light and for dark pages, and a
+    class for each colour that draws in it.
     """
     light, dark = (
         ";".join(f"--{name}:{pair[shade]}" for name, pair in PALETTE.items()) for shade in (0, 1)
@@ -182,5 +192,5 @@ def palette_css() -> str:
 
 
 def with_capital(text: str) -> str:
-    """Return `text` with a capital first letter; the others stay as they are."""
+    """Return `text` with a capital first letter; other letters are not changed."""
     return text[:1].upper() + text[1:]

@@ -7,34 +7,35 @@ import re
 
 from markupsafe import Markup, escape
 
-NOTHING = "–"  # a number that does not exist
+NOTHING = "–"  # text in place of a number that does not exist
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-# There are none below 1: a moment of 1e-3 N m beside others of 1e3 N m is small, not "1 mN m".
+# There are no prefixes for numbers below 1. A moment of 1e-3 N m beside one of 1e3 N m is to look
+# small, which "1 mN m" would not.
 _PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""))
 SPACE = "\N{NO-BREAK SPACE}"
 _COMPUTED = re.compile(r"(?<![\w./-])(-?\d+(?:\.\d+)?)e([+-]?\d+)\b")
-# A symbol with its index: c, q̇2, U33,3. In prose "a" may be a word, E1 is an erratum, and "kg m²"
-# is a unit.
+# A symbol with its index, if it has one: c, q̇2, U33,3. The pattern for prose excludes words such as
+# "a", errata such as E1, and the m of units such as "kg m²".
 _SYMBOL = re.compile(r"(?<![A-Za-z&#])(q̇|[A-Za-zα-ω])(\d+(?:,\d)?)?(?![A-Za-z])")
 _SYMBOL_IN_PROSE = re.compile(
     r"(?<![A-Za-z&#])(?<!kg )(?<!N "
     r")(q̇|[cdmqsUα-ω])(\d+(?:,\d)?)?(?![A-Za-z'])"
 )
-_ALONE_IN_PROSE = "cdm"  # letters that are symbols in prose though they have no index
+_ALONE_IN_PROSE = "cdm"  # letters that are symbols in prose even without an index
 _SIGN = re.compile(r"(?<![\w)])-(?=\S)|(?<= )-(?= )")
 
 
 def power(exponent: int) -> str:
-    """Return a power of ten: 10⁻¹⁰ for -10."""
+    """Return a power of ten as text: "10⁻¹⁰" for -10."""
     return "10" + str(exponent).translate(_SUPERSCRIPT)
 
 
 def number(value: float | None, digits: int = 2) -> str:
-    """Return a number with so many significant digits: 0.31, 12, 1200, 1.2×10⁻¹⁰.
+    """Return a number as text with few significant digits: 0.31, 12, 1200, 1.2×10⁻¹⁰.
 
     Parameters
     ----------
-    value : None gives a dash, NaN and infinities "not finite".
+    value : the number. None gives a dash; NaN and infinities give "not finite".
     digits : number of significant digits.
     """
     if value is None:
@@ -43,7 +44,7 @@ def number(value: float | None, digits: int = 2) -> str:
         return "not finite"
     if value == 0.0:
         return "0"
-    # The exponent of the rounded number: 9.99 with two digits is 10.
+    # The exponent is that of the rounded number: 9.99 with two digits is 10.
     mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
     if -3 <= int(exponent) < 4:
         return minus(f"{value:.{max(digits - 1 - int(exponent), 0)}f}")
@@ -60,9 +61,9 @@ def typeset_title(title: str) -> str:
 
 
 def fixed(value: float | None, decimals: int) -> str:
-    """Return a number with a given count of decimals, as a paper prints it.
+    """Return a number as text with a given number of decimals, as a paper prints it.
 
-    A zero has no sign; None gives a dash.
+    A number that is rounded to zero has no sign. None gives a dash.
     """
     if value is None:
         return NOTHING
@@ -71,14 +72,14 @@ def fixed(value: float | None, decimals: int) -> str:
 
 
 def with_unit(value: float | None, unit: str, digits: int = 2) -> str:
-    """Return a number with its unit, without a line break between them."""
+    """Return a number with its unit as text, without a line break between them."""
     return number(value, digits) if value is None else f"{number(value, digits)}{SPACE}{unit}"
 
 
 def prefix_of(largest: float) -> tuple[float, str]:
-    """Return the scale of a channel and the prefix of its unit: k, M, G or none.
+    """Return the scale by which values are divided, and the prefix of their unit: k, M, G or "".
 
-    Values are divided by the scale; `largest` is the largest size among them.
+    `largest` is the largest magnitude of the values.
 
     >>> prefix_of(4.2e4)
     (1000.0, 'k')
@@ -90,17 +91,19 @@ def prefix_of(largest: float) -> tuple[float, str]:
 
 
 def prefixed(value: float | None, unit: str, digits: int = 3) -> str:
-    """Return a number with its unit, and a prefix of the unit where it is large: "1.12 MJ"."""
+    """Return a number with its unit as text; the unit of a large number has a prefix: "1.12 MJ"."""
     if value is None or not math.isfinite(value) or value == 0.0:
         return with_unit(value, unit, digits)
-    # 999.9 with three digits is 1.00 k.
+    # The prefix is that of the rounded number: 999.9 with three digits is 1.00 k.
     rounded = float(f"{value:.{digits - 1}e}")
     scale, prefix = prefix_of(abs(rounded))
     return f"{number(value / scale, digits)}{SPACE}{prefix}{unit}"
 
 
 def up_to(value: float | None, digits: int = 2) -> str:
-    """Return a size rounded up, for "within" and "below": 2.33e-6 is within 2.4×10⁻⁶.
+    """Return a magnitude as text, rounded up: 2.4×10⁻⁶ for 2.33e-6.
+
+    A sentence such as "they agree within 2.4×10⁻⁶" is thus true.
 
     >>> up_to(2.33e-6), up_to(5.19e-6, 1), up_to(0.0)
     ('2.4×10⁻⁶', '6×10⁻⁶', '0')
@@ -108,22 +111,22 @@ def up_to(value: float | None, digits: int = 2) -> str:
     if value is None or not math.isfinite(value) or value == 0.0:
         return number(value, digits)
     step = 10.0 ** (math.floor(math.log10(value)) - digits + 1)
-    # The quotient of a number that has these digits may lie above a whole number by its rounding
-    # alone.
+    # If the value has no more than these digits, the quotient may be slightly above a whole number
+    # because of rounding. The factor prevents that such a value is rounded up.
     return number(math.ceil(value / step * (1.0 - 1e-12)) * step, digits)
 
 
 def span(low: float, high: float, digits: int = 3, unit: str = "") -> str:
-    """Return a range, both ends to the digits of the larger one.
+    """Return a range of two numbers as text, both rounded to the last digit of the larger one.
 
-    A number that is much smaller than the larger end is thus written as zero. Where both ends are
-    written alike it is one number.
+    A number that is much smaller than the larger one is thus written as zero. If both numbers have
+    the same text, the range is a single number.
 
     Parameters
     ----------
-    low, high : the ends.
-    digits : significant digits of the larger end.
-    unit : directly behind both numbers, such as °.
+    low, high : ends of the range.
+    digits : number of significant digits of the end with the larger magnitude.
+    unit : text directly after each number, such as "°".
 
     Examples
     --------
@@ -139,7 +142,7 @@ def span(low: float, high: float, digits: int = 3, unit: str = "") -> str:
 
 
 def text_range(low: str, high: str) -> str:
-    """Return a range of two numbers that are text already; one where both are written alike.
+    """Return a range of two numbers that are given as text; a single one if the texts are equal.
 
     >>> text_range("0.824", "0.825"), text_range("0.825", "0.825")
     ('0.824 to 0.825', '0.825')
@@ -148,7 +151,9 @@ def text_range(low: str, high: str) -> str:
 
 
 def shortest(value: float) -> str:
-    """Return a number that somebody chose, as briefly as possible: 0, 300, 10⁵, 3.2×10⁴, 9.81.
+    """Return a number as text with all its digits, up to six: 0, 300, 10⁵, 3.2×10⁴, 9.81.
+
+    It is meant for numbers that a user chose, which have few digits.
 
     >>> shortest(1e5), shortest(300.0), shortest(-3.2e4), shortest(1e-3)
     ('10⁵', '300', '−3.2×10⁴', '0.001')
@@ -162,7 +167,7 @@ def shortest(value: float) -> str:
 
 
 def seconds(value: float) -> str:
-    """Return a time of at most three digits with its unit: "20 s", "3.45 s".
+    """Return a time in s as text with at most three digits and its unit: "20 s", "3.45 s".
 
     >>> seconds(20.0).replace(SPACE, " "), seconds(3.449).replace(SPACE, " ")
     ('20 s', '3.45 s')
@@ -171,7 +176,7 @@ def seconds(value: float) -> str:
 
 
 def in_words(count: int) -> str:
-    """Return a small count as a word: "three"; larger ones in digits.
+    """Return a count up to ten as a word, such as "three", and a larger one in digits.
 
     >>> in_words(3), in_words(17)
     ('three', '17')
@@ -181,9 +186,9 @@ def in_words(count: int) -> str:
 
 
 def typeset(text: str) -> str:
-    """Return a sentence with computed numbers typeset: 8.1 for 8.1e+00, 10⁻⁶ for 1e-06.
+    """Return a text with numbers in e-notation typeset: 8.1 for 8.1e+00, 10⁻⁶ for 1e-06.
 
-    Names such as torque-1e9 stay, and text that is markup already.
+    Names such as torque-1e9 are not changed. A text that is already markup is not changed either.
     """
 
     def shortest(computed: re.Match[str]) -> str:
@@ -203,9 +208,13 @@ def minus(text: str) -> str:
 
 
 def formula(text: str, *, in_prose: bool = False) -> Markup:
-    """Return the text with symbols in italics and their indices as subscripts.
+    """Return a text as markup with symbols in italics and their indices as subscripts.
 
-    in_prose : single letters are words, but for those that are symbols of the paper.
+    Parameters
+    ----------
+    text : the text.
+    in_prose : whether the text is prose with symbols. A letter without an index is then a symbol
+        only if it is c, d or m.
     """
     symbol = _SYMBOL_IN_PROSE if in_prose else _SYMBOL
 

@@ -1,4 +1,4 @@
-"""List the paper's figures, and choose the runs of each from a file; nothing is drawn here."""
+"""List the paper's figures, and choose the runs for each of them from a file."""
 
 from __future__ import annotations
 
@@ -9,18 +9,19 @@ from rotor_mbs.methods.catalogue import REFERENCE, find_method_or_none
 from rotor_mbs.runs.read import StoredRun, StoredScene
 
 MOTION, PATHS, TORQUES = "motion", "paths", "torques"
-# Headings of the models' columns, by key, from left to right. An independent model has no column:
-# it is drawn by its difference alone.
+# Headings of the columns by model, from left to right. The independent model has no column, because
+# only its difference from the corrected model is drawn.
 HEADINGS = {"printed": "As printed", "corrected": "Corrected model"}
 PRINTED_SIDE, CORRECTED, INDEPENDENT = "printed", "corrected", "independent"
 
 
 class PaperFigure(NamedTuple):
-    """A figure of the paper, or of one scene that is in none of them.
+    """A figure of the paper, or the figure of a scene that the paper's figures do not show.
 
-    number : of the paper's figure, "11"; "" where it is not the paper's.
+    number : number of the paper's figure, such as "11"; "" if the figure is not the paper's.
     kind : MOTION, PATHS or TORQUES.
-    panels : (letter, scene) each; the letter is "" where there is none, and a torque for TORQUES.
+    panels : (label, name of the scene) of each panel. The label is "" for MOTION, a letter for
+        PATHS, and the torque for TORQUES.
     """
 
     number: str
@@ -49,9 +50,13 @@ FIGURES = (
 
 
 def available(scenes: Mapping[str, StoredScene]) -> tuple[PaperFigure, ...]:
-    """Return the paper's figures of which `scenes` has a panel, with these panels alone.
+    """Return the paper's figures for which there are scenes, with the panels of these scenes only.
 
-    A scene that differs from the shipped one has no panel.
+    A scene whose motion differs from that of the shipped scene does not count.
+
+    Parameters
+    ----------
+    scenes : stored scenes by name.
     """
     figures = []
     for figure in FIGURES:
@@ -64,7 +69,10 @@ def available(scenes: Mapping[str, StoredScene]) -> tuple[PaperFigure, ...]:
 
 
 def all_figures(scenes: Mapping[str, StoredScene]) -> dict[str, PaperFigure]:
-    """Return the paper's figures by number, then one by name for each scene in none of them."""
+    """Return all figures for given scenes: the paper's by number, then others by name of the scene.
+
+    Each scene that none of the paper's figures shows has a figure of its own.
+    """
     figures = {figure.number: figure for figure in available(scenes)}
     shown = {name for figure in figures.values() for _, name in figure.panels}
     for name in scenes:
@@ -74,19 +82,20 @@ def all_figures(scenes: Mapping[str, StoredScene]) -> dict[str, PaperFigure]:
 
 
 def compared_runs(scene: StoredScene) -> dict[str, StoredRun]:
-    """Return the scene's runs with angles and rates by "printed", "corrected", and "independent".
+    """Return the runs of a scene that are compared, by "printed", "corrected" and "independent".
 
-    The independent run is the first corrected one with samples that is neither of the Lagrange
-    model nor the reference.
+    The independent run is the first run of another corrected model than the Lagrange model. Runs
+    without angles and rates are left out.
 
     Parameters
     ----------
-    scene : whose runs are chosen.
+    scene : the stored scene.
     """
     candidates = scene.sides
     for name, run in scene.corrected_runs.items():
         method = find_method_or_none(name)
-        # The reference is of the Lagrange model: another run of that model is not independent.
+        # The reference is computed by the Lagrange model, so that other runs of this model are not
+        # independent of it.
         is_other = not name.startswith("lagrange/") and (method is None or method.name != REFERENCE)
         if is_other and run.samples and run not in candidates.values():
             candidates[INDEPENDENT] = run
@@ -97,10 +106,15 @@ def compared_runs(scene: StoredScene) -> dict[str, StoredRun]:
 def panel_runs(
     figure: PaperFigure, scenes: Mapping[str, StoredScene]
 ) -> dict[str, dict[str, dict[str, StoredRun]]]:
-    """Return the runs of a figure: by letter of the row, then by model, then by label.
+    """Return the runs of a figure by row, then by model, then by label.
 
-    A figure of torques has one row, in which the labels are the torques. Where `scenes` lack paths,
-    a figure of paths has no run.
+    The key of a row is the letter of its panel. A figure of torques has a single row, whose labels
+    are the torques. A figure of paths has no runs without stored tip positions.
+
+    Parameters
+    ----------
+    figure : the figure.
+    scenes : stored scenes by name.
     """
     rows: dict[str, dict[str, dict[str, StoredRun]]] = {}
     for label, name in figure.panels:

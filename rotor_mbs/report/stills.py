@@ -1,6 +1,7 @@
-"""Draw still pictures in the classes of the style sheet.
+"""Draw still pictures as SVG, with the classes of the style sheet.
 
-They are plots, as the page's script draws them, for pages without scripts, and paths of tips.
+There are two kinds: plots for browsers without scripts, as the page's script draws them, and paths
+of the blade tips.
 """
 
 from __future__ import annotations
@@ -19,20 +20,20 @@ from rotor_mbs.report.numbers import minus, power, typeset
 from rotor_mbs.report.tip_paths import Line, picture_of
 from rotor_mbs.solution.quantities import Array
 
-_WIDTH = 340  # px, as on a telephone
-_TOP, _RIGHT, _BOTTOM = 6, 12, 24  # px around the curves
-_LETTER = 7.3  # px, the width of a digit
-_FAR = 1e4  # px: curves do not go farther beyond the edge
-_MAX_POINTS = 200  # of a curve: more than one for two pixels
-_LARGEST = 1e300  # beyond it a range would overflow
+_WIDTH = 340  # px, width of a picture, which fits a telephone
+_TOP, _RIGHT, _BOTTOM = 6, 12, 24  # px, margins around the curves
+_LETTER = 7.3  # px, width of a digit
+_FAR = 1e4  # px, largest coordinate of a point; points beyond it are moved there
+_MAX_POINTS = 200  # approximate largest number of points of a curve: more than one for two pixels
+_LARGEST = 1e300  # largest magnitude of a drawn value; with larger ones a range might overflow
 
 
 def still(plot: Plot) -> Markup:
-    """Return a picture of a plot, an `svg` element.
+    """Return a still picture of a plot, an `svg` element.
 
     Parameters
     ----------
-    plot : of curves with several rows the first row is drawn.
+    plot : the plot. If the values of a curve are a table of several runs, its first row is drawn.
     """
     first, last = plot.x.first, plot.x.last
     low, high = _range(plot)
@@ -53,7 +54,7 @@ def still(plot: Plot) -> Markup:
         parts.append(
             f'<text x="{middle:.1f}" y="{plot.height - 7}" text-anchor="middle">{label}</text>'
         )
-    # What leaves the frame is cut off by an svg of the frame's size.
+    # An inner svg element of the frame's size cuts off the parts of curves outside the frame.
     width, height = right - left, bottom - _TOP
     parts.append(
         f'<svg x="{left:.1f}" y="{_TOP}" width="{width:.1f}" height="{height}" '
@@ -77,14 +78,14 @@ def still(plot: Plot) -> Markup:
 
 
 def _values(curve: Curve, *, is_log: bool) -> Array:
-    """Return the values of a curve that can be drawn; NaN for the others, (n,)."""
+    """Return the values of a curve, (n,), with NaN for those that cannot be drawn."""
     values = np.asarray(curve.y if curve.y.ndim == 1 else curve.y[0], dtype=float)
     can_be_drawn = np.isfinite(values) & ((values > 0.0) | (not is_log))
     return np.where(can_be_drawn, np.clip(values, -_LARGEST, _LARGEST), np.nan)
 
 
 def _range(plot: Plot) -> tuple[float, float]:
-    """Return the range of the vertical axis."""
+    """Return the range of the vertical axis of a plot."""
     low, high = math.inf, -math.inf
     for curve in plot.curves:
         values = _values(curve, is_log=plot.log)
@@ -99,7 +100,7 @@ def _range(plot: Plot) -> tuple[float, float]:
     if plot.log:
         decade = math.floor(math.log10(low) + 1e-9)
         return 10.0**decade, 10.0 ** max(math.ceil(math.log10(high) - 1e-9), decade + 1)
-    # A constant, and what is rounding error, is not magnified.
+    # A constant is not magnified, nor is a range that is rounding error.
     size = max(abs(low), abs(high))
     least = max(plot.least, 1e-6 * size)
     if high - low > least:
@@ -114,12 +115,12 @@ def _range(plot: Plot) -> tuple[float, float]:
 def _scale(
     first: float, last: float, start: float, end: float, *, is_log: bool
 ) -> Callable[[Array | float], Array]:
-    """Return a function from values to pixels.
+    """Return a function that converts values on an axis to pixels.
 
     Parameters
     ----------
-    first, last : values at the ends of an axis.
-    start, end : px, the ends.
+    first, last : values at the ends of the axis.
+    start, end : positions of the ends, px.
     is_log : whether the axis is logarithmic.
     """
     of_value: Callable[..., Array] = np.log10 if is_log else np.asarray
@@ -133,14 +134,14 @@ def _scale(
 
 
 def _ticks(first: float, last: float, most: int, *, is_log: bool) -> list[tuple[float, str]]:
-    """Return the places and texts of at most `most` round ticks of an axis.
+    """Return the ticks of an axis, at round numbers: value and text of each.
 
-    A logarithmic axis within a decade has those of a linear one.
+    A logarithmic axis with fewer than two powers of ten has the ticks of a linear axis.
 
     Parameters
     ----------
-    first, last : the range of the axis.
-    most : number of ticks.
+    first, last : values at the ends of the axis.
+    most : approximate largest number of ticks.
     is_log : whether the axis is logarithmic.
     """
     if is_log:
@@ -161,7 +162,8 @@ def _ticks(first: float, last: float, most: int, *, is_log: bool) -> list[tuple[
     shown = [place for place in places if place > 0.0 or not is_log]
     texts = [f"{place:.9g}" for place in shown]
     if not any("e" in text for text in texts):
-        # All have the decimals of the longest: 1.270 beside 1.268. Zero has none.
+        # All texts have as many decimals as the longest one, such as 1.270 beside 1.268. Only the
+        # text of zero has none.
         decimals = max((len(text.partition(".")[2]) for text in texts), default=0)
         texts = [f"{place:.{decimals}f}" if place else "0" for place in shown]
     return [(place, minus(typeset(text))) for place, text in zip(shown, texts, strict=True)]
@@ -174,12 +176,14 @@ def _drawn(
     *,
     is_log: bool,
 ) -> list[str]:
-    """Return the elements of a curve: its line, and its points where they are marked.
+    """Return the SVG elements of a curve: its line, and its points if they are marked.
+
+    The line is interrupted at NaN and before the samples in `curve.breaks`.
 
     Parameters
     ----------
-    curve : NaN, and the jumps before its `breaks`, are gaps in the line.
-    to_x, to_y : from values to pixels.
+    curve : the curve.
+    to_x, to_y : functions that convert values to pixels.
     is_log : whether the vertical axis is logarithmic.
     """
     values = _values(curve, is_log=is_log)
@@ -205,18 +209,18 @@ def _drawn(
 
 # ---- Paths of the tips
 
-_REACH = 165.0  # px, half of the picture's height
-# px: points of a path that are closer to the last one are left out. On the largest circle the chord
-# is then 0.01 px from the arc.
+_REACH = 165.0  # px, length in the picture of the radius that contains all paths
+# px, distance along a path from one drawn point to the next. The points in between are left out. A
+# chord of this length is at most 0.01 px from the arc of the largest circle.
 _APART = 3.0
 
 
 def path_picture(tip: Array, caption: str) -> Markup:
-    """Return a picture of the paths of tips, a `figure` element with its caption.
+    """Return a picture of the paths of the tips, a `figure` element with a caption.
 
     Parameters
     ----------
-    tip : (n, blades, 3) m, base frame.
+    tip : (n, blades, 3) positions of the tips, m, base frame.
     caption : text above the picture.
     """
     reach, lines, texts = picture_of(tip)
@@ -235,12 +239,12 @@ def path_picture(tip: Array, caption: str) -> Markup:
 
 
 def _line_of_path(line: Line, points: Array) -> str:
-    """Return the elements of a line, and of the mark at its end.
+    """Return the SVG elements of a line and of the mark at its end, as text.
 
     Parameters
     ----------
-    line : how it is drawn.
-    points : (n, 2) px.
+    line : the line, with its colour, width, dashes and mark.
+    points : (n, 2) points of the line, px.
     """
     length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
     _, kept = np.unique(length // _APART, return_index=True)

@@ -1,4 +1,4 @@
-"""Compute the lines of a picture of the tips' paths, as seen from far away."""
+"""Compute the lines in a picture of the tips' paths, in a parallel projection."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ import numpy as np
 from rotor_mbs.report.looks import GREY, RING, coordinate_look
 from rotor_mbs.solution.quantities import Array
 
-_AZIMUTH, _ELEVATION = np.radians((-62.0, 14.0))  # of the view
+_AZIMUTH, _ELEVATION = np.radians((-62.0, 14.0))  # direction from which the rotor is seen
 
 
 class Line(NamedTuple):
     """A line of the picture.
 
-    points : (n, 2) m, to the right and up.
-    colour : such as "#0072b2".
-    width : points.
-    label : what it is; "" for lines of a frame and of blades.
-    dashed : whether it is dashed.
-    end : "hollow" or "filled", the mark at its last point; "" for none.
+    points : (n, 2) positions in the picture, to the right and up, m.
+    colour : colour such as "#0072b2".
+    width : width of the line, points.
+    label : name of the line in a legend. Only the paths have one; other lines have "".
+    dashed : whether the line is dashed.
+    end : mark at the last point: "hollow", "filled", or "" for none.
     """
 
     points: Array
@@ -35,9 +35,9 @@ class Line(NamedTuple):
 class Picture(NamedTuple):
     """The paths of the tips, the blades at the start and at the end, shaft, axes and a scale.
 
-    reach : m, radius around the hub that contains all points.
-    lines : in the order in which they are drawn.
-    texts : names of the axes and the length of an axis: (position, text), the latter the last.
+    reach : radius around the hub that contains all paths, m.
+    lines : lines in the order in which they are drawn.
+    texts : (position, text) of each text: the names of the three axes, then their length.
     """
 
     reach: float
@@ -46,12 +46,12 @@ class Picture(NamedTuple):
 
 
 def picture_of(tip: Array, tilt: float = 0.0) -> Picture:
-    """Return the picture of paths.
+    """Return the picture of the paths of the tips.
 
     Parameters
     ----------
-    tip : (n, blades, 3) m, base frame.
-    tilt : of the shaft, rad.
+    tip : (n, blades, 3) positions of the tips, m, base frame.
+    tilt : tilt of the shaft, rad.
     """
     reach = 1.04 * float(np.linalg.norm(tip, axis=2).max())
     angle = np.linspace(0.0, 2.0 * np.pi, 37)
@@ -65,7 +65,8 @@ def picture_of(tip: Array, tilt: float = 0.0) -> Picture:
     lines = [Line(projected(ring), RING, 0.7), Line(projected(shaft), GREY, 3.0)]
     texts = []
     ten = 10.0 ** math.floor(math.log10(reach))
-    # The scale: the longest of 1, 2 or 5 times a power of ten within a third of the reach.
+    # The axes are the scale of the picture. Their length is the largest number that is at most a
+    # third of the reach and is 1, 2 or 5 times a power of ten.
     length = next(step * ten for step in (5.0, 2.0, 1.0, 0.5, 0.2) if reach >= 3.0 * step * ten)
     corner = np.array([-0.88, -0.86]) * reach
     for end, name in zip(projected(length * np.eye(3)), "xyz", strict=True):
@@ -82,7 +83,7 @@ def picture_of(tip: Array, tilt: float = 0.0) -> Picture:
 
 
 def projected(points: Array) -> Array:
-    """Project points to the plane of a picture, as seen from far away, above and to the side.
+    """Project points onto the plane of the picture, seen from the side and from above.
 
     Parameters
     ----------
@@ -91,7 +92,7 @@ def projected(points: Array) -> Array:
     Returns
     -------
     (n, 2) ndarray
-        To the right and up, m.
+        Positions in the picture, to the right and up, m.
     """
     right = np.array([-np.sin(_AZIMUTH), np.cos(_AZIMUTH), 0.0])
     level = np.array([np.cos(_AZIMUTH), np.sin(_AZIMUTH), 0.0])
