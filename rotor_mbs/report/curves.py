@@ -81,7 +81,7 @@ class CurveStore:
         return self.every if np.shape(values)[-1] > _LONG else 1
 
     def text(self) -> str:
-        """Return all columns in base64, little endian; "" where none is stored."""
+        """Return all columns in base64, little endian; "" if no column is stored."""
         if not self._parts:
             return ""
         return base64.b64encode(np.concatenate(self._parts).tobytes()).decode("ascii")

@@ -179,7 +179,7 @@ class _Motions(NamedTuple):
 
     names: tuple[str, ...]
     rotating: Array  # (speeds, motions) Hz
-    fixed: Array | None  # (speeds, motions) Hz; None where no whirl is defined
+    fixed: Array | None  # (speeds, motions) Hz; None if no whirl is defined
 
 
 def _motions(linear: LinearModes) -> _Motions:

@@ -95,8 +95,8 @@ def ranking(compared: Sequence[SuiteRun], methods: Sequence[str]) -> list[Markup
     verb = "is" if len(names) == 1 else "are"
     which = with_capital(" and ".join(names[:3]))
     sentences = [text.format(which, verb, best, max(counts.values()), comment)]
-    # The fewest scenes are those of the smallest share, because not every method has run every
-    # scene.
+    # The worst methods are found by their shares of ok runs, because not every method was run on
+    # every scene.
     shares = {method: good[method] / max(counts[method], 1) for method in methods}
     worst = min(methods, key=lambda method: shares[method])
     if good[worst] < best:

@@ -1,6 +1,6 @@
 "use strict";
 (() => {
-  // The map of a sweep: a quantity in every cell, and the curves of the run that is chosen.
+  // Fills the map of a sweep with a quantity of each run, and shows the curves of the run that the reader chooses.
   const source = document.getElementById("sweep");
   if (!source) return;
   const data = JSON.parse(source.textContent);

@@ -1,7 +1,8 @@
 "use strict";
 (() => {
-  // Draws every .plot of the page from the numbers in #curves. Plots over the same quantity, time above all, are read
-  // and zoomed together; a section's legend switches curves in all its plots.
+  // Draws every element .plot of the page with the numbers in #curves. Plots over the same quantity, usually time, are
+  // zoomed together, and their values are read together. The legend of a section switches curves in all plots of the
+  // section.
   const store = document.getElementById("curves");
   const bytes = store ? Uint8Array.from(atob(store.textContent), (letter) => letter.charCodeAt(0)) : new Uint8Array(0);
   const numbers = new Float32Array(bytes.buffer);
@@ -31,7 +32,7 @@
       : `${(value / 10 ** exponent).toFixed(digits - 1)}×10${raised(exponent)}`;
     return written.replace(/^-/, "−");
   };
-  // As short as it can be: 5×10⁻⁴.
+  // The shortest text of a number, such as 5×10⁻⁴.
   const brief = (value) => text(value, 9).replace(/(\.\d*?)0+×/, "$1×").replace(".×", "×");
 
   // ---- Axes
@@ -45,7 +46,8 @@
     };
   };
 
-  // Places and texts of at most `most` round ticks; of a short logarithmic axis those of a linear one.
+  // The ticks at round numbers, about `most` of them: value and text of each. A logarithmic axis with fewer than two
+  // powers of ten has the ticks of a linear axis.
   const ticks = (from, to, most, isLog) => {
     if (isLog) {
       const step = Math.max(1, Math.ceil((Math.log10(to) - Math.log10(from)) / most));
@@ -64,7 +66,8 @@
       const value = Number((i * step).toPrecision(9));
       if (value > 0 || !isLog) values.push(value);
     }
-    // All have the decimals of the longest, 1.270 beside 1.268; zero, and powers of ten, have their own.
+    // All texts have as many decimals as the longest one, such as 1.270 beside 1.268. Zero has none. Texts with powers
+    // of ten keep their own decimals.
     const labels = values.map(brief), isPlain = !labels.some((label) => label.includes("×"));
     const decimals = Math.max(0, ...labels.map((label) => label.split(".")[1]?.length ?? 0));
     return values.map((value, i) => [value, isPlain && value ? value.toFixed(decimals).replace("-", "−") : labels[i]]);
@@ -77,7 +80,7 @@
     return from ? Float64Array.from(values, (value) => value + from) : values;
   };
 
-  // The sample nearest to a value; -1 where the curve does not reach there, or has a gap.
+  // The index of the sample nearest to a value of x; -1 if the curve does not extend to this value, or has a gap there.
   const nearest = (xs, ys, value) => {
     let low = 0, high = xs.length - 1;
     if (high < 0) return -1;
@@ -91,7 +94,7 @@
     return Math.abs(xs[place] - value) <= room && Number.isFinite(ys[place]) ? place : -1;
   };
 
-  // Whether a sample, or the line to a neighbour, lies in what is shown.
+  // Whether a sample, or the line to one of its neighbours, lies in the shown range of x.
   const isNear = (xs, i, from, to) => !(xs[i + 1] < from || xs[i - 1] > to);
 
   // ---- Elements
@@ -126,7 +129,7 @@
 
     const extent = () => zooms[axis.name] ?? axis.range;
 
-    // The vertical range of what is shown, and what of it lies beyond the clip.
+    // The vertical range of the plot for a shown range of x.
     const range = (from, to) => {
       let low = Infinity, high = -Infinity;
       shown.forEach(({ xs, ys }) => {
@@ -150,14 +153,15 @@
         const decade = Math.floor(Math.log10(low) + 1e-9);
         return [10 ** decade, 10 ** Math.max(Math.ceil(Math.log10(high) - 1e-9), decade + 1)];
       }
-      // A constant, and what is rounding error, is not magnified.
+      // A constant is not magnified, nor is a range that is rounding error.
       const size = Math.max(Math.abs(low), Math.abs(high)), least = Math.max(plot.least ?? 0, 1e-6 * size);
       if (high - low > least) return [low - 0.06 * (high - low), high + 0.06 * (high - low)];
       const room = size > least ? 0.1 * size : 1;
       return [low - room, high + room];
     };
 
-    // The path of a curve, and its first sample that is in sight horizontally but not vertically.
+    // The path of a curve, and the index of its first sample that lies in the shown range of x but above or below the
+    // vertical range; -1 if there is none.
     const trace = ({ xs, ys, breaks = [], dots }, from, to, [low, high]) => {
       const isDense = xs.length * (to - from) > DENSE * width * (axis.range[1] - axis.range[0]);
       const jumps = new Set(breaks);
@@ -191,7 +195,8 @@
       return { path, outside };
     };
 
-    // On paper as many plots stand side by side as the style sheet says, however wide the window is.
+    // The width of the plot on paper. The number of plots side by side is that of the style sheet for print, which does
+    // not depend on the width of the window.
     const printedWidth = () => {
       const grid = box.closest("[class^=grid]"), isWide = box.closest(".grid2 > .card:last-child:nth-child(odd)");
       const columns = isWide ? 1 : Number(grid?.className.slice(4) ?? 1);
@@ -206,7 +211,7 @@
       const limits = range(from, to), [low, high] = limits;
       const labels = ticks(low, high, plot.log ? 5 : Math.max(2, Math.floor(plot.height / 38)), plot.log);
       left = Math.max(34, 13 + LETTER * Math.max(0, ...labels.map(([, label]) => label.length)));
-      // Long names that would take more than a third of the width are in the legend alone.
+      // If a name would take more than a third of the width, long names are only in the legend.
       const isLong = ({ length }) => length > 5 && LETTER * length > (width - left) / 3;
       let names = ends(to, limits);
       if (names.some(([name]) => isLong(name))) names = names.filter(([name]) => name.length <= 5);
@@ -225,7 +230,7 @@
         draw(svg, "path", { class: "grid", d: `M${x} ${TOP}V${bottom}` });
         draw(svg, "text", { x: Math.min(x, width - half), y: plot.height - 7, "text-anchor": "middle" }, label);
       });
-      // What leaves the frame is cut off by an svg of the frame's size.
+      // An inner svg element of the frame's size cuts off the parts of curves outside the frame.
       const size = { x: left, y: TOP, width: right - left, height: bottom - TOP };
       const area = draw(svg, "svg", { ...size, viewBox: `${left} ${TOP} ${size.width} ${size.height}` });
       const marks = (plot.marks ?? []).filter(({ x }) => x === undefined || (x >= from && x <= to));
@@ -258,7 +263,7 @@
       }
     };
 
-    // The texts of curves that reach the right edge within the frame, with the value there.
+    // (text, value at the right edge) of the curves with a text that reach the right edge within the frame.
     const ends = (to, [low, high]) => shown.filter(({ beside }) => beside).map(({ xs, ys, beside }) => {
       let i = xs.findIndex((x) => x >= to);
       if (i < 0 && to - xs[xs.length - 1] <= 1e-6 * Math.abs(to)) i = xs.length - 1;  // single precision
@@ -266,7 +271,7 @@
       return [beside, i > 0 ? ys[i - 1] + share * (ys[i] - ys[i - 1]) : ys[i]];
     }).filter(([, value]) => value >= low && value <= high);
 
-    // They stand beyond the edge, where no curve is, a line of text apart.
+    // Draws these texts to the right of the frame, where no curve is, at least a line of text apart.
     const nameEnds = (names) => {
       const placed = names.map(([name, value]) => [name, sy.at(value) + 4]).sort((one, other) => one[1] - other[1]);
       placed.forEach((place, i) => {
@@ -280,8 +285,8 @@
       placed.forEach(([name, y]) => draw(svg, "text", { class: "quiet", x: right + 6, y }, name));
     };
 
-    // The texts beside the ends of other curves, above or below them where there is room, else left out. Each text is drawn
-    // over all curves.
+    // Draws the texts of other curves above or below the ends of the curves, over all curves. If there is no room, a text
+    // is left out.
     const label = (area, curves, from, to, [low, high]) => {
       const boxes = [];
       curves.forEach(({ xs, ys, beside }) => {
@@ -299,7 +304,7 @@
       });
     };
 
-    // The first line of an edge where a text covers no other one.
+    // The first line of text at an edge of the frame in which a text covers no other text.
     const freeLine = (taken, from, to) => {
       let line = 0;
       while (taken.some((other) => other.line === line && other.from < to && from < other.to)) line++;
@@ -307,7 +312,8 @@
       return line;
     };
 
-    // A curve that leaves the range says how far it goes; those that go equally far say so together.
+    // Draws, for a curve that leaves the vertical range, a text with its extreme value. Curves with the same extreme value
+    // share a text.
     const leave = (area, curves, [, high], top, foot) => {
       const said = new Map();
       curves.forEach(({ xs, ys, name, first }) => {
@@ -326,7 +332,7 @@
       });
     };
 
-    // The text of a mark; vertical ones in a line of their own where the text before would be covered.
+    // Draws the text of a mark. The text of a vertical mark is moved to another line if it would cover another text.
     const describe = (area, { x, y, text: content }, top, foot) => {
       if (x === undefined) {
         const at = sy.at(y) < TOP + 17 ? sy.at(y) + 14 : sy.at(y) - 5;  // below a mark at the upper edge
@@ -335,7 +341,7 @@
       }
       const length = LETTER * content.length, isLeft = sx.at(x) + length > right;
       const from = isLeft ? sx.at(x) - length : sx.at(x);
-      // At the foot where curves cross the text at the top and none does there.
+      // The text is at the lower edge if curves cross it at the upper edge, but not at the lower one.
       const isCrossed = (y) => shown.some(({ xs, ys }) => xs.some((value, i) => {
         const px = sx.at(value);
         return px >= from && px <= from + length && Math.abs(sy.at(ys[i]) - y) < 9;
@@ -347,7 +353,8 @@
       draw(area, "text", { class: "quiet", ...place }, content);
     };
 
-    // The values of all curves at a place of the horizontal axis; a box with them where the pointer or the keys are.
+    // Shows the values of all curves at a value of x. The plot that has the pointer or the keys (`isMine`) also shows
+    // them in a box.
     const read = (value, isMine) => {
       here = value;
       cursor.replaceChildren();
@@ -376,17 +383,17 @@
         row.insertCell().textContent = name;
         row.insertCell().textContent = text(y, 5);
       });
-      // On the side away from the pointer, so that the box covers no curve there.
+      // The box is on the side with more room, beside the cursor.
       const x = sx.at(value), isRight = x > box.clientWidth / 2;
       tip.style.left = isRight ? "auto" : `${x + 14}px`;
       tip.style.right = isRight ? `${box.clientWidth - x + 14}px` : "auto";
     };
 
-    // ---- What the reader does
+    // ---- Pointer and keys
 
     const together = () => plots.filter((other) => other.axis.name === axis.name);
 
-    // All plots over the same axis are read at the stored sample that is nearest.
+    // Shows the values of all plots over the same quantity at the stored sample that is nearest to a value of x.
     const show = (wanted) => {
       let value = wanted;
       if (value !== null && shown.length > 0) {
@@ -436,7 +443,7 @@
     };
     svg.addEventListener("pointerup", release);
     svg.addEventListener("pointercancel", release);
-    // A finger that leaves keeps its reading; a mouse takes it away.
+    // The values stay if a finger leaves the plot. They vanish if a mouse leaves it.
     svg.addEventListener("pointerleave", (event) => {
       if (pressed === null && event.pointerType === "mouse") show(null);
     });
@@ -464,7 +471,7 @@
     });
     plots.push({ axis, box, redraw, read, printedWidth });
     redraw();
-    // Text stays 12 px high at every width: the drawing is made anew, not scaled.
+    // If the width changes, the drawing is made again and not scaled, so that its texts stay 12 px high.
     new ResizeObserver(() => {
       if (!isPrinting && box.clientWidth && Math.max(box.clientWidth, 200) !== width) redraw();
     }).observe(box);
@@ -489,7 +496,7 @@
   };
   window.addEventListener("beforeprint", () => print(true));
   window.addEventListener("afterprint", () => print(false));
-  // The clock of the viewer, and the run that a map shows.
+  // The animation sends its time, and the map of a sweep sends the run that the reader chose.
   document.addEventListener("viewer-time", (event) => {
     plots.filter(({ axis }) => axis.name === TIME).forEach((plot) => plot.read(event.detail, false));
   });

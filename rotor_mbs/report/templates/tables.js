@@ -1,5 +1,5 @@
 "use strict";
-// A click on a heading sorts the rows by its column: numbers by their value, what has none last.
+// A click on a heading sorts the rows by its column: numbers by their value, other texts alphabetically.
 document.querySelectorAll("th[aria-sort] button").forEach((button) => button.addEventListener("click", () => {
   const head = button.closest("th"), place = head.cellIndex, body = head.closest("table").tBodies[0];
   const isUp = head.getAttribute("aria-sort") !== "ascending";

@@ -1,18 +1,21 @@
 "use strict";
 (() => {
-  // Turns the data of each viewer on the page into a rotor that moves. Angles: rotor, then a pitch per blade.
+  // Draws the animation of the rotor from the data of each element .viewer on the page. Angles of a frame: rotor, then the
+  // pitch of each blade.
   const RING = 72, ARC = 0.06, TRAIL = 20000;
   const VIEWS = { oblique: [-62, 14], front: [-90, 0], side: [0, 0], top: [-90, 89] };
   const shades = getComputedStyle(document.documentElement), night = matchMedia("(prefers-color-scheme:dark)");
   const shade = (name) => shades.getPropertyValue(`--${name}`).trim();
 
-  // Angles are whole, not within one turn: straight from a frame to the next.
+  // The angles at a place between two frames, which may be fractional. Angles are not reduced to one turn, so that they
+  // can be interpolated linearly.
   const between = (frames, place) => {
     const last = frames.length - 1, i = Math.min(Math.floor(place), last), j = Math.min(i + 1, last), part = place - i;
     return frames[i].map((from, k) => from + part * (frames[j][k] - from));
   };
 
-  // Places on the path of each frame interval: so many that it turns by no more than ARC between two of them.
+  // The number of points of a tip's path for each interval between frames. It is so large that the blade turns by at most
+  // ARC from a point to the next, or by more if the whole path would have more than about TRAIL points.
   const sections = (frames, column) => {
     const ways = frames.slice(1).map((to, i) => Math.abs(to[0] - frames[i][0]) + Math.abs(to[column] - frames[i][column]));
     const arc = Math.max(ARC, ways.reduce((sum, way) => sum + way, 0) / TRAIL);
@@ -24,7 +27,8 @@
     return angle ? [x, c * y - s * z, s * y + c * z] : [x, y, z];
   };
 
-  // Rx(tilt) Ry(rotor + phase) Rx(-cone) Rz(pitch) of a point of the blade, its distance from the pitch axis magnified.
+  // The position of a point of a blade: Rx(tilt) Ry(rotor + phase) Rx(-cone) Rz(pitch) times the point, with its distance
+  // from the pitch axis magnified.
   const placed = (point, blade, tilt, rotor, pitch, magnified) => {
     const c = Math.cos(pitch), s = Math.sin(pitch), x = point[0] * magnified, y = point[1] * magnified;
     const a = Math.cos(rotor + blade.phase), b = Math.sin(rotor + blade.phase);
@@ -43,7 +47,7 @@
     const value = (name, otherwise) => (part(name) ? part(name).value : otherwise);
     const magnified = () => Number(value("offset", 1));
 
-    // Of each blade the points of its path, and the time of each.
+    // Computes the points of the path of each blade's tip, and their times, for each model.
     const trace = () => {
       trails = models.map(({ frames }) => data.blades.map((blade, i) => {
         const points = [], times = [];
@@ -180,7 +184,7 @@
         }
       }
       draw();
-      // The page's plots show the same time.
+      // The plots of the page then show their values at the same time.
       if (now !== told) document.dispatchEvent(new CustomEvent("viewer-time", { detail: now }));
       told = now;
       if (playing) refresh();
