@@ -13,19 +13,23 @@ import numpy as np
 import pytest
 from support.defects import made_defects
 from support.references import reference
-from support.scenes import AXIAL, PAPER_SCENES, make_scene, paper, shipped
+from support.scenes import AXIAL, PAPER_SCENES, general, make_scene, paper, shipped
 
 from rotor_mbs.analysis.judgement import judge
+from rotor_mbs.errors import InputError
 from rotor_mbs.methods.catalogue import find_method
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.models.lagrange import closed_form
 from rotor_mbs.models.lagrange import defects as defects_module
 from rotor_mbs.models.lagrange.defects import (
     FIT_ROWS,
+    explicit_steps,
     fitted_rates,
     interval_defects,
     interval_ends,
+    quick_ends,
     rates_of_change,
+    runge_kutta_step,
 )
 from rotor_mbs.models.lagrange.hamilton import resting_pitches
 from rotor_mbs.models.lagrange.heyoka_adapter import is_available
@@ -720,13 +724,22 @@ def test_a_fitted_rate_changes_with_an_angle_as_its_sensitivity_says() -> None:
         np.testing.assert_allclose(change[FIG11.moving_coordinates], expected, rtol=1e-3, atol=1e-9)
 
 
+@pytest.mark.parametrize(("name", "samples"), [("fig11", 26), ("fig14a", 26)])
+def test_rows_too_far_apart_for_a_motion_give_no_rates(name: str, samples: int) -> None:
+    """0.4 s between rows of a pitch that turns several times a second."""
+    scene = paper(name, duration=10.0, samples=samples, outputs=("angles", "rates"))
+    run = solve(DOP853, scene, {}).trajectory
+    with pytest.raises(InputError, match="the rows are too far apart for this motion"):
+        fitted_rates(scene, run.time, run.angles)
+
+
 def test_an_interval_over_many_jumps_of_a_torque_has_each() -> None:
     """1 s of each torque in turn, in one interval; and further intervals behind it."""
     torques = [300.0, -600.0, 900.0, 100.0, -200.0]
     table = [
         (float(second + end), torque) for second, torque in enumerate(torques) for end in (0, 1)
     ]
-    scene = balanced(tuple(table))
+    scene = replace(balanced(tuple(table)), duration=5.0)
     rate, angle = 4.0, 1.0
     for torque in torques[:4]:
         angle += rate + 0.5 * torque / INERTIA
@@ -736,6 +749,66 @@ def test_an_interval_over_many_jumps_of_a_torque_has_each() -> None:
     assert ends[0] == pytest.approx(state[1], rel=1e-12, abs=1e-12)
     last = rate + torques[4] / INERTIA
     assert ends[1, 4] == pytest.approx(last, rel=1e-12)
+    (over_all,) = interval_ends(scene, np.zeros(1), np.array([5.0]), state[:1])
+    assert over_all[4] == pytest.approx(last, rel=1e-12)
+
+
+def test_a_runge_kutta_step_is_of_order_four() -> None:
+    """The step of y' = -y is the series of exp(-h) up to h⁴; that of y' = 4 t³ is exact, as
+    Simpson's rule is. Each interval has a step of its own."""
+    time, h = np.array([0.5, 2.0]), np.array([0.25, 0.5])
+    decayed = runge_kutta_step(lambda _t, y: -y, time, np.array([1.0, 3.0]), h)
+    series = 1.0 - h + h**2 / 2.0 - h**3 / 6.0 + h**4 / 24.0
+    assert decayed == pytest.approx([1.0, 3.0] * series, rel=1e-14)
+    power = runge_kutta_step(lambda t, _y: 4.0 * t**3, time, time**4, h)
+    assert power == pytest.approx((time + h) ** 4, rel=1e-14)
+
+
+def test_quick_ends_are_of_order_four_under_a_load_that_grows_and_jumps() -> None:
+    """Of intervals that begin and end at a jump, and are nowhere near the time zero; the values of
+    the torque inside the intervals count."""
+    scene = general(
+        duration=6.0, rotor_torque=((3.0, 9e6), (3.0, 0.0), (4.0, 4e5), (4.0, -9e6), (6.0, -9e6))
+    )
+    begins, ends = np.array([3.0, 3.5]), np.array([3.5, 4.0])
+    count = len(scene.moving_coordinates)
+    state = np.array([*scene.initial_angles, *scene.initial_rates])
+    states = np.tile(state, (2, 1))
+    exact = interval_ends(scene, begins, ends, states)
+    errors = []
+    for steps in (64, 128):
+        quick = quick_ends(scene, begins, ends, states.T, steps).T
+        errors.append(np.abs(quick - exact).max(axis=1))
+    assert count == 4
+    assert (errors[1] < 1e-6).all()
+    assert errors[0] / errors[1] == pytest.approx([16.0, 16.0], rel=0.2)
+
+
+def test_explicit_steps_turn_at_most_a_quarter_of_a_radian() -> None:
+    """Of the fastest rate, the pitch frequency by spring and weight, and the decay by dampers."""
+    states, intervals = np.array([[0.0] * 4 + [2.0, -3.0, 0.0, np.inf]]), np.array([0.5, 1.0])
+
+    def steps(scene: Scene, most: int = 100) -> int | None:
+        return explicit_steps(scene, intervals, states, most)
+
+    scene, inertia = balanced(), AXIAL.pitch_inertia
+    assert steps(scene) == 12  # 3 rad/s over 1 s
+    assert explicit_steps(scene, intervals, 0.01 * np.ones((1, 8)), 100) == 1
+    sprung = replace(scene, bearing_stiffness=(0.0, inertia * 5.0**2, 0.0))
+    assert steps(sprung) == 20
+    offset = replace(AXIAL, centre_of_mass=(0.0, 1.0, 3.0))
+    weight = offset.mass * 9.8 / offset.pitch_inertia
+    heavy = replace(
+        scene,
+        blades=(offset,) * 3,
+        gravity=9.8,
+        bearing_stiffness=(offset.pitch_inertia * (7.95**2 - weight), 0.0, 0.0),
+    )
+    assert steps(heavy) == 32  # 7.95 rad/s by both together
+    damped = replace(scene, bearing_damping=(0.0, 0.0, inertia * 10.0))
+    assert steps(damped) == 40
+    assert steps(damped, most=40) == 40
+    assert steps(damped, most=39) is None
 
 
 # ---- Transition matrices
