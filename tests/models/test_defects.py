@@ -173,6 +173,9 @@ def change_by_start(scene: Scene, step: float) -> Array:
         ("fig09", {}),
         # Rates that change within an interval.
         ("fig11", {"samples": 11, "initial_rates": (np.pi / 10.0, 30.0, 0.0, 0.0)}),
+        # So much, from rest, that as many explicit steps as the rates at the start ask for would
+        # leave 2e-3.
+        ("fig11", {"samples": 3, "pitch_torque": (((0.0, 3300.0),), (), ())}),
     ],
 )
 def test_the_transition_matrices_are_those_of_the_variational_equations(

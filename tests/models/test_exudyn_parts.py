@@ -163,6 +163,16 @@ def test_a_hopeless_solve_ends_soon_and_says_so_in_one_line(name, capfd) -> None
     assert said.out == said.err == ""
 
 
+@pytest.mark.parametrize("name", ["exudyn_tree/rk67", "exudyn_chain/generalized_alpha"])
+def test_a_run_over_its_time_limit_says_so_and_keeps_its_samples(name: str) -> None:
+    """The engine makes an error of its own of what interrupts it within its code."""
+    scene = paper("fig11", duration=3000.0, samples=30001)
+    run = solve(name, scene, {}, time_limit_s=0.3)
+    assert run.integration.out_of_time
+    assert run.integration.message == "stopped at the time limit"
+    assert 1 <= len(run.trajectory.time) < 30001
+
+
 @pytest.mark.parametrize("name", ["exudyn_chain/generalized_alpha", "exudyn_chain/newmark_index2"])
 def test_a_solve_that_fails_is_counted_to_the_last_step_that_it_took(name) -> None:
     """The kink of the torque comes after it, and makes another interval, which is not begun."""

@@ -127,24 +127,34 @@ EXPLAINED = {
     r"lagrange\.defects\._(DOP853|RADIANS_PER_STEP|ROUGH_END) ": (
         "half as much again is within the accuracy that is asked of the matrices, or of a defect"
     ),
-    r"lagrange\.defects\._(FIT_ROUNDS|STANDS_STILL|NEAR) |fitted_rates .*(277:18|285:)": (
+    r"lagrange\.defects\._(FIT_ROUNDS|STANDS_STILL|NEAR) |fitted_rates .*(step \* np\.abs|usual <= )": (
         "where the rounds of a fit end: half as much again, or a round more, does as well"
     ),
     r"lagrange\.defects\._(SIDE|SMALLEST_SHARE|DIFFERENCE|SMALL_DIFFERENCE|SMALL_AT_END) ": (
         "the size of a difference or of a share near zero: half as much again does as well"
     ),
+    r"fitted_rates .*before == np\.inf turned": (
+        "rows that are too far apart are so in every round, and near ones are near in every round"
+    ),
+    r"quick_ends .*right side of (begins \+|ends -) _SIDE": "how near to a jump it is inside of it",
     r"fitted_rates .*1\.0 / step scaled": "a unit of the rates, of which a fit is independent",
     r"fitted_rates .*and, or in np\.isfinite": (
         "both hold the same matrices: where one is not finite, neither is the other"
     ),
-    r"interval_ends .*(325:14 right|330:52 right)": "whole numbers are compared",
-    r"interval_ends .*(327:|332:|333:|337:|338:)": (
+    r"interval_ends .*right side of (place|part) \+ 1": "whole numbers are compared",
+    r"interval_ends .*(0 -> 1$|steps \+ taken|reached < end|steps >= _FEW|max\(max_steps)": (
         "bounds the work on rows that are no motion, which are NaN in any case"
     ),
     r"_advance_by_taylor .*(len\(state\) > count turned|if has_work|0\.0 -> )": (
         "the work is no part of a defect, wherever it begins"
     ),
-    r"_advance_by_dop853 .*0 -> 1": "SciPy counts its evaluations: there is no other case",
+    r"_advance_by_dop853 .*(0 -> 1|or 0$)": "SciPy counts its evaluations: there is no other case",
+    r"lagrange\.defects\._transitions ": (
+        "more explicit steps, or difference quotients in place of them, are as accurate"
+    ),
+    r"_(difference|quick)_transitions .*(differences / |away / units|1 \+ count scaled)": (
+        "the size that is near enough; of a number of copies the fraction is cut off"
+    ),
     r"defects\.KEPT_ROWS ": "decides how much memory a run takes, not what comes out",
     r"judgement\.smallest_rotor_inertia_share .*65 -> 66": (
         "points of a search along the way to the next sample"
