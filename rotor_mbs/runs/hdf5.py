@@ -206,7 +206,7 @@ def _read_group(group: Any, path: str, regions: Mapping[str, tuple[int, int]]) -
     table = TableSpec(path, runs, known, computed, attributes_of(group), characters)
     for name, region in regions.items():
         dataset = datasets[name]
-        if dataset.shape != table.shape(name) or place_of(dataset) != tuple(region):
+        if dataset.shape != table.shape(name) or region_of(dataset) != tuple(region):
             place = f"{group.file.filename}: {path}/{name}"
             raise StoreError(f"{place} has shape {dataset.shape} of {dataset.dtype}; damaged")
     return table
@@ -460,7 +460,7 @@ def reason_of(error: Exception) -> str:
     return text.partition("(")[2].rpartition(")")[0] or text
 
 
-def place_of(dataset: Any) -> tuple[int, int]:
+def region_of(dataset: Any) -> tuple[int, int]:
     """Return the offset and the length of the values of a contiguous dataset, in bytes."""
     return dataset.id.get_offset() or 0, dataset.nbytes
 

@@ -26,7 +26,7 @@ from rotor_mbs.runs.hdf5 import (
     Column,
     TableSpec,
     is_group,
-    place_of,
+    region_of,
 )
 from rotor_mbs.runs.output_files import replacing, write_file
 from rotor_mbs.runs.table import StoredTable, TableFile
@@ -137,7 +137,7 @@ def _put_table(file: Any, table: TableSpec) -> dict[str, tuple[int, int]]:
     for name, column in table.computed.items():
         kind, shape = table.row_type[name].base, table.shape(name)
         fill = MISSING if name == "status" else None
-        regions[name] = place_of(put_empty(group, name, shape, kind, column, fill))
+        regions[name] = region_of(put_empty(group, name, shape, kind, column, fill))
     return regions
 
 

@@ -71,7 +71,7 @@ from rotor_mbs.report.pages import (
     status_text,
 )
 from rotor_mbs.report.pages import scene_plots as draw
-from rotor_mbs.report.pages.scene_plots import CORRECTED, PRINTED, Channel, Jumps
+from rotor_mbs.report.pages.scene_plots import CORRECTED, PRINTED, ChannelCurves, Jumps
 from rotor_mbs.report.pages.viewer import viewer
 from rotor_mbs.runs.read import StoredRun, StoredScene
 from rotor_mbs.scenario.scene import Scene
@@ -508,7 +508,7 @@ def _peak(run: StoredRun, name: str) -> tuple[float, int, float] | None:
     return float(sizes[sample, blade]), int(blade) + 1, float(run.array("time")[sample])
 
 
-def _root_moments(run: StoredRun) -> list[Channel]:
+def _root_moments(run: StoredRun) -> list[ChannelCurves]:
     """Return a list with the channel of the magnitudes of the blade root moments.
 
     The list is empty if the run does not have these moments. The answer and the facts of the page
@@ -591,7 +591,7 @@ def _own_facts(scene: StoredScene, run: StoredRun) -> list[Fact]:
 
 def motion_channels(
     scene: StoredScene, run: StoredRun, jumps: Jumps
-) -> tuple[list[Channel], list[Channel]]:
+) -> tuple[list[ChannelCurves], list[ChannelCurves]]:
     """Return the channels of the motion of a run in two lists: main channels, and the others.
 
     Parameters
@@ -602,32 +602,34 @@ def motion_channels(
 
     Returns
     -------
-    main : list of Channel
+    main : list of ChannelCurves
         Rotor speed and pitch angles, if the run has them.
-    others : list of Channel
+    others : list of ChannelCurves
         Powers, rotor angle, and pitch rates, if the run has them.
     """
     main, others = [], []
     rotor = coordinate_look(0)
     if "rates" in run:
         speed = run.array("rates")[:, 0]
-        main.append(Channel("Rotor speed", "rad/s", [("rotor", rotor, speed)], draw.LEAST_ANGLE))
+        main.append(
+            ChannelCurves("Rotor speed", "rad/s", [("rotor", rotor, speed)], draw.LEAST_ANGLE)
+        )
     if "angles" in run:
         angles = run.array("angles")
         if angles.shape[1] > 1:
             pitches = _blade_curves(np.degrees(angles[:, 1:]))
-            main.append(Channel(_PITCH, "degrees", pitches, math.degrees(draw.LEAST_ANGLE)))
+            main.append(ChannelCurves(_PITCH, "degrees", pitches, math.degrees(draw.LEAST_ANGLE)))
         unit, factor = "revolutions", 1.0 / _TURN
         if abs(float(angles[-1, 0] - angles[0, 0])) < _TURN:
             unit, factor = "degrees", math.degrees(1.0)
         turned = [("rotor", rotor, factor * angles[:, 0])]
-        others.append(Channel("Rotor angle", unit, turned, factor * draw.LEAST_ANGLE))
+        others.append(ChannelCurves("Rotor angle", unit, turned, factor * draw.LEAST_ANGLE))
     if "rates" in run:
         rates = run.array("rates")
         others = [*_powers(scene.scene, run, jumps), *others]
         if rates.shape[1] > 1:
             others.append(
-                Channel("Pitch rate", "rad/s", _blade_curves(rates[:, 1:]), draw.LEAST_ANGLE)
+                ChannelCurves("Pitch rate", "rad/s", _blade_curves(rates[:, 1:]), draw.LEAST_ANGLE)
             )
     return main, others
 
@@ -651,7 +653,7 @@ def _commands(scene: Scene, time: Array) -> list[Curve]:
     return curves
 
 
-def _powers(scene: Scene, run: StoredRun, jumps: Jumps) -> list[Channel]:
+def _powers(scene: Scene, run: StoredRun, jumps: Jumps) -> list[ChannelCurves]:
     """Return the channels of power: torque on the rotor with shaft damper, and pitch actuators.
 
     Parameters
@@ -696,9 +698,9 @@ def _powers(scene: Scene, run: StoredRun, jumps: Jumps) -> list[Channel]:
 
 def _in_units(
     name: str, unit: str, curves: Sequence[tuple[str, Look, Array]], breaks: Sequence[int] = ()
-) -> Channel:
+) -> ChannelCurves:
     scale, prefixed_unit = draw.in_units([values for _, _, values in curves], unit)
-    return Channel(
+    return ChannelCurves(
         name,
         prefixed_unit,
         [(key, look, values / scale) for key, look, values in curves],
@@ -737,8 +739,8 @@ def _motion_section(
     scene: StoredScene,
     run: StoredRun,
     jumps: Jumps,
-    main: Sequence[Channel],
-    others: Sequence[Channel],
+    main: Sequence[ChannelCurves],
+    others: Sequence[ChannelCurves],
 ) -> Section:
     """Return the section with the motion of a run.
 
@@ -788,7 +790,7 @@ def _motion_section(
     return Section("motion", "Motion", elements, say)
 
 
-def _energy_channel(run: StoredRun) -> Channel | None:
+def _energy_channel(run: StoredRun) -> ChannelCurves | None:
     """Return the channel of kinetic energy, potential energy and work.
 
     None is returned if the run does not have all three.
@@ -806,7 +808,7 @@ def _energy_channel(run: StoredRun) -> Channel | None:
 
 
 def _loads_section(
-    run: StoredRun, jumps: Jumps, loads: Sequence[Channel], energy: Channel | None
+    run: StoredRun, jumps: Jumps, loads: Sequence[ChannelCurves], energy: ChannelCurves | None
 ) -> Section:
     """Return the section with the loads and energies of a run.
 
@@ -861,7 +863,7 @@ def _loads_section(
     return Section("loads", heading, elements, say)
 
 
-def _extremes_section(run: StoredRun, channels: Sequence[Channel]) -> Section:
+def _extremes_section(run: StoredRun, channels: Sequence[ChannelCurves]) -> Section:
     """Return the section with the extremes, means and standard deviations of all curves.
 
     Parameters

@@ -307,7 +307,7 @@ def spark(curves: Sequence[tuple[Array, Array, Look]], low: float, high: float) 
 # ---- Channels of one run
 
 
-class Channel(NamedTuple):
+class ChannelCurves(NamedTuple):
     """The curves of a run that one plot shows, such as the components of a load along one axis.
 
     name : title of the plot.
@@ -369,7 +369,7 @@ def in_units(values: Sequence[Array], unit: str) -> tuple[float, str]:
     return scale, f"{prefix}{unit}"
 
 
-def quantity_channels(quantity: Quantity, run: StoredRun, jumps: Jumps) -> list[Channel]:
+def quantity_channels(quantity: Quantity, run: StoredRun, jumps: Jumps) -> list[ChannelCurves]:
     """Return the channels of a stored quantity: three if it has vectors, else one.
 
     Each channel of vectors has the components along one axis. Components below 1e-9 of the largest
@@ -423,14 +423,14 @@ def quantity_channels(quantity: Quantity, run: StoredRun, jumps: Jumps) -> list[
         scale, unit = in_units([array for _, _, array in curves], quantity.units)
         scaled = [(key, look, array / scale) for key, look, array in curves]
         channels.append(
-            Channel(
+            ChannelCurves(
                 f"{title} {axis}".strip(), unit, scaled, floor / scale, frame.lstrip(", "), breaks
             )
         )
     return channels
 
 
-def load_channels(stored: StoredScene, run: StoredRun, jumps: Jumps) -> list[Channel]:
+def load_channels(stored: StoredScene, run: StoredRun, jumps: Jumps) -> list[ChannelCurves]:
     """Return the channels of a run's loads, and of quantities of other packages.
 
     Moments and forces at the blade roots come first, then those of the shaft.
