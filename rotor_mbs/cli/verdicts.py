@@ -191,7 +191,8 @@ def test_method(arguments: argparse.Namespace) -> int:
     if arguments.json != Path("-"):
         rows: list[tuple[str, ...]] = []
         for verdict in verdicts:
-            has_note = not verdict.passed or verdict.name == "refusal"
+            # Of these checks the note says what was found, such as the measured order.
+            has_note = not verdict.passed or verdict.name in ("refusal", "order")
             number = bound = ""
             if verdict.unit:
                 number, bound = f"{verdict.value:.1e}", f"{verdict.bound:.1e}"
