@@ -74,7 +74,7 @@ def bench(
     >>> bool(np.nanmin(curve["angle_error_max"]) < 1e-9)
     True
     """
-    from rotor_mbs.studies.bench import run_bench  # late: most users time nothing
+    from rotor_mbs.studies.bench import run_bench  # not at the top: most users time nothing
 
     scene, budget = scene_of(scene), positive("budget", as_float(budget))
     if operator.index(repeats) < 1:
@@ -148,7 +148,7 @@ class BenchCurves(Mapping[str, Mapping[str, Any]]):
 
     def to_html(self, folder: str | os.PathLike[str]) -> Path:
         """Write the pages on the curves into a folder, and return the path of the index."""
-        from rotor_mbs.report.build import write_report  # late: templates
+        from rotor_mbs.report.build import write_report  # not at the top: it loads the templates
 
         return write_report(self.path, file_path(folder))
 

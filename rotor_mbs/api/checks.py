@@ -131,7 +131,7 @@ def check(
     >>> rm.check("fig03.h5").passed                                      # doctest: +SKIP
     True
     """
-    from rotor_mbs.studies.check import check_file  # late: models
+    from rotor_mbs.studies.check import check_file  # not at the top: it loads the models
 
     known = shipped_bounds()
     if bounds is not None:
@@ -164,7 +164,7 @@ def test_method(name: str | os.PathLike[str], *, timeout: float = 60.0) -> Check
     >>> rm.test_method("lagrange/dop853").passed                         # doctest: +SKIP
     True
     """
-    from rotor_mbs.studies.method_test import examine  # late: models
+    from rotor_mbs.studies.method_test import examine  # not at the top: it loads the models
 
     seconds = valid_seconds(timeout)
     return Checks(

@@ -147,11 +147,10 @@ class DataComparison:
         """Return a pandas DataFrame with a row per channel.
 
         `error_max` and `error_whole` are the largest errors up to the horizon and over all rows, in
-        `unit`. `defect` is the largest defect beyond the rounding of the data, and `floor` the
-        estimated effect of this rounding on a defect, of which three times is subtracted; both are
-        in `defect_unit`. The other columns have,
-        for each of several levels, the time (s) up to which the errors stay within the level; for
-        modes the speed (rad/s).
+        `unit`. `floor` is the estimated effect of the rounding of the data on a defect; `defect` is
+        what remains of the largest defect after three times the floor is subtracted. Both are in
+        `defect_unit`. The other columns have, for each of several levels, the time (s) up to which
+        the errors stay within the level; for modes the speed (rad/s).
         """
         rows = []
         for channel in self.verdict.channels:
@@ -164,9 +163,9 @@ class DataComparison:
     def plot(self) -> Panels:
         """Plot the defects of each coordinate over time with the tolerance.
 
-        If the data have no defects, for example in a table of modes, plot the errors.
+        If no interval defects are known, for example for a table of modes, plot the errors.
         """
-        # late: matplotlib
+        # not at the top: it loads matplotlib
         from rotor_mbs.report.pages.comparison import defect_panels, error_panels
 
         return (defect_panels(self.record) or error_panels(self.record)).with_legend()
@@ -178,7 +177,7 @@ class DataComparison:
         `pitch_1_error`, and for angles and rates `pitch_1_defect` (rad), the defect of the interval
         before each row. Variables have units.
         """
-        import xarray  # late: 0.4 s
+        import xarray  # not at the top: it takes 0.4 s
 
         record = self.record
         variables = {
@@ -196,7 +195,7 @@ class DataComparison:
 
     def to_html(self, folder: str | os.PathLike[str]) -> Path:
         """Write the page on the comparison into a folder, and return the path of the page."""
-        from rotor_mbs.report.files import write_page  # late: templates
+        from rotor_mbs.report.files import write_page  # not at the top: it loads the templates
         from rotor_mbs.report.pages.comparison import comparison_page
 
         return write_page(file_path(folder), comparison_page(self.record), versions() | machine())

@@ -105,7 +105,7 @@ class Modes(SceneModes):
     @property
     def plot(self) -> ModePlots:
         """Return the plots of the modes; `modes.plot()` draws the Campbell diagram."""
-        from rotor_mbs.report.pages.modes import ModePlots  # late: matplotlib
+        from rotor_mbs.report.pages.modes import ModePlots  # not at the top: it loads matplotlib
 
         return ModePlots(self)
 
@@ -154,7 +154,7 @@ class Modes(SceneModes):
         states = {"rotation": self.rotation, "rest": self.rest}
         if state not in states:
             raise InputError(f"no state {shown_value(state)}; allowed: {', '.join(states)}")
-        import xarray  # late: 0.4 s
+        import xarray  # not at the top: it takes 0.4 s
 
         return linear_dataset(states[state], xarray)
 
@@ -171,7 +171,7 @@ class Modes(SceneModes):
 
     def to_html(self, folder: str | os.PathLike[str]) -> Path:
         """Write the page on the modes into a folder, and return the path of the page."""
-        from rotor_mbs.report.files import write_page  # late: templates
+        from rotor_mbs.report.files import write_page  # not at the top: it loads the templates
         from rotor_mbs.report.pages.modes import modes_page
 
         return write_page(file_path(folder), modes_page([self]), versions() | machine())

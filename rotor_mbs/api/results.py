@@ -90,7 +90,7 @@ class Run(Solution):
     @property
     def plot(self) -> RunPlots:
         """Return the plots of the run; `run.plot()` draws the motion."""
-        from rotor_mbs.report.plots import RunPlots  # late: matplotlib
+        from rotor_mbs.report.plots import RunPlots  # not at the top: it loads matplotlib
 
         return RunPlots(self, self.reference)
 
@@ -314,7 +314,7 @@ class Results(Mapping[Any, Any]):
 
         Raises InputError if these are the runs of several scenes or of a sweep.
         """
-        from rotor_mbs.report.plots import ComparisonPlots  # late: matplotlib
+        from rotor_mbs.report.plots import ComparisonPlots  # not at the top: it loads matplotlib
 
         if not self.scene:
             chosen = [f"results[{name!r}]" for name in [*self._stored.subsets[:1], *self][:2]]
@@ -350,7 +350,7 @@ class Results(Mapping[Any, Any]):
         InputError
             If `unstack` is true and the runs are not a grid of varied parameters.
         """
-        import xarray  # late: 0.4 s
+        import xarray  # not at the top: it takes 0.4 s
 
         self._stored.verify()
         if unstack and not self._stored.keys:
@@ -377,7 +377,7 @@ class Results(Mapping[Any, Any]):
 
     def to_html(self, folder: str | os.PathLike[str]) -> Path:
         """Write the report pages into a folder, and return the path of the index."""
-        from rotor_mbs.report.build import write_report  # late: templates
+        from rotor_mbs.report.build import write_report  # not at the top: it loads the templates
 
         return write_report(self.path, file_path(folder))
 

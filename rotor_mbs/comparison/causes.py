@@ -31,9 +31,9 @@ def likely_causes(search: TrajectorySearch, judged: JudgedDefects | None) -> lis
 
     Mistakes in columns and times are tried first; then other models, other parameters and faults at
     some times; then scatter, or a factor of a channel. If the data start in another state than the
-    scene, other models are tried last, because the reason may be a mistake in one column. In this
-    case only one kind of other model is tried earlier, before scatter: scenes of the catalogue that
-    have the initial state of the data.
+    scene, a mistake in one column may be why. Other models are then tried last. Only one kind of
+    them is tried earlier, before scatter: scenes of the catalogue that have the initial state of
+    the data.
 
     Parameters
     ----------

@@ -34,7 +34,8 @@ class DataColumn(NamedTuple):
     unit : the unit that the file states; "" if it states none.
     step : step between the numbers, in the same unit, if they are packed as integers; otherwise 0.
     missing : text for messages about the first missing number, with its row: "empty in row 2 of 9
-        (line 3)"; "" if no number is missing, or the text of the file is not known.
+        (line 3)"; "" if no number is missing, or if it is not known how the file writes a missing
+        number, as for arrays.
     """
 
     values: NDArray[np.float64]
@@ -192,8 +193,8 @@ def table_of(
         if unit:
             stated[name] = unit
     # Dimensions of length 1 come from MATLAB, whose arrays have at least two dimensions; they are
-    # removed. An exception is a table of modes for a single speed, which an array of shape (1,)
-    # shows: arrays whose first dimension is 1 are then left as they are.
+    # removed. An exception is a table of modes for a single speed. The data are taken as such a
+    # table if an array has the shape (1,); arrays whose first dimension is 1 then keep it.
     is_single_row = any(values.shape == (1,) for values in numeric.values())
     for name, values in list(numeric.items()):
         squeezed = values if is_single_row and values.shape[:1] == (1,) else np.squeeze(values)

@@ -30,7 +30,9 @@ from rotor_mbs.solution.trajectory import Array
 # Numbers of significant digits. Whether numbers have a given number of digits is tested by
 # arithmetic up to _FEW_DIGITS digits, and by formatting them as text for more digits. In the test
 # by text, a relative difference of _ROUNDED_SINCE is allowed up to _SURE_DIGITS digits. For more
-# digits none is allowed: nearly any number would pass. No double needs more than _ALL_DIGITS.
+# digits no difference is allowed: it would be nearly as large as the rounding itself, and numbers
+# that are not rounded would pass, too (a third of them at 15 digits, nearly all at 16). No double
+# needs more than _ALL_DIGITS.
 _FEW_DIGITS, _SURE_DIGITS, _ALL_DIGITS = 9, 14, 17
 # At most about this many numbers of a column, evenly spaced, are formatted as text: 1 us each.
 _MAX_WRITTEN = 20_000
@@ -219,7 +221,7 @@ def data_of_table(
         )
         of_steps = rounding_of_steps(time)
         time_rounding = rounding[0][places] if of_steps is None else of_steps
-        if of_steps is None:  # with equal intervals the digits of the times do not matter
+        if of_steps is None:  # the intervals differ: the times are as exact as their digits
             channel, source = next(iter(sources.items()))
             written = rounding[0] / _factor(channel, source)
             time_precision = _time_precision(columns[0], written, source.unit)
@@ -451,7 +453,7 @@ def _time_precision(time: Array, rounding: Array, unit: str) -> str:
     ----------
     time, rounding : (n,) times as they were written, and the rounding of each, in the unit of the
         file.
-    unit : the unit of the file; it is added to a rounding error that is not in s.
+    unit : the unit of the file. If it is not s, the text has it after the rounding error.
     """
     text = _precision([time], [rounding])
     if "decimals" in text and unit not in ("", "s"):
@@ -482,7 +484,8 @@ def _have_digits(values: Array, digits: int) -> bool:
     digits : number of significant digits.
     """
     if digits <= _FEW_DIGITS:
-        # For the smallest doubles, the unit may be 0; these numbers then fit no number of digits.
+        # For the smallest doubles, the unit may be 0. They then fail this test, and are found to
+        # have more digits.
         with np.errstate(all="ignore"):
             unit = 10.0 ** (np.floor(np.log10(np.abs(values))) + 1 - digits)
             rounded = np.round(values / unit) * unit

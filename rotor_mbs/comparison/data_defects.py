@@ -159,8 +159,9 @@ def judged_defects(
     vectors = np.hstack([defects.angles[:, moving], defects.rates[:, moving]])
     units = np.concatenate([np.ones(len(moving)), defects.rate_units[moving]])
     values = vectors / units
-    # A number near zero has less rounding than the other numbers of its channel. Floors therefore
-    # have a lower limit, a share of the channel's median.
+    # The estimated rounding of a number near zero is much smaller than that of its neighbours. The
+    # small defects at such a number must not look large beside it: floors have a lower limit, a
+    # share of the channel's median.
     floors = np.maximum(defects.floors, 0.3 * np.median(defects.floors, axis=0) + 1e-18)
     is_judged = defects.is_resolved & np.isfinite(vectors).all(axis=1)
     sizes = np.abs(np.where(is_judged[:, None], values, 0.0))

@@ -309,8 +309,8 @@ def _suggested(table: DataTable, known: Sequence[Channel]) -> list[tuple[Channel
     table : the columns.
     known : all channels that the data may have.
     """
-    # The number of an array's columns is needed, too: an array of angles has one column for each
-    # coordinate.
+    # A name such as "q[2]" is recognized only with the number of columns of its array "q": an array
+    # of angles has one column for each coordinate.
     places = places_of(list(table.columns))
     suggested = []
     for name in table.columns:

@@ -2,8 +2,8 @@
 
 Some programs write a row twice at an event, some write rows of an initialisation before t = 0, and
 some write the rows from the end to the start. Rows that repeat another row are dropped. Data with
-different rows at one time are refused, unless a load jumps at this time: the row after the jump is
-then kept.
+two different rows at one time are refused. An exception are rows that differ only in their loads,
+at a time at which a load jumps: the row after the jump is kept.
 """
 
 from __future__ import annotations

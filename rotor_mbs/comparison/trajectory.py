@@ -63,8 +63,8 @@ _LEFT_OF_SMALL_ERRORS = 0.02
 # Largest number of references that are kept for further data of the same scene and times, and
 # largest number of rows of each. With three blades they take up to some 12 MB.
 _MAX_KEPT, _MAX_KEPT_ROWS = 4, 20_000
-# At the start and at the end of the motion, this many times the largest interval between rows may
-# be without rows.
+# Data may begin late, and end early, by at most this many times the largest interval between their
+# rows.
 _MAX_GAP = 1.5
 
 
@@ -76,7 +76,8 @@ class ReferencedRows:
     ----------
     data : rows within the scene's duration. Whole turns are added to wrapped channels, so that
         these begin in the same turn as the reference.
-    compared : the rows of `data` that the reference reaches; `rows` below is their number.
+    compared : the rows of `data` that the reference reaches. In the shapes below, `rows` is their
+        number.
     exact : reference at the times of the data and at the scene's samples.
     places : (rows,) indices in `exact` of the times of `compared`.
     reference : reference at the times of `compared`.
@@ -114,8 +115,8 @@ class TrajectoryErrors:
     error : (rows, channels) magnitudes of the errors against the reference, rad and rad/s.
     per_growth : (rows, channels) `error` divided by `carried_errors`, the size to which a relative
         error of 1 at the start may have grown.
-    excess_per_growth : (channels,) largest value, up to the horizon, of the part of `error` beyond
-        rounding divided by `carried_errors`.
+    excess_per_growth : (channels,) as `per_growth`, but of the part of `error` beyond rounding
+        only; the largest value up to the horizon.
     predicted, defect_time : see `DataVerdict`.
     drift : rad, the largest sum of defects over 10 or 100 rows (`STRETCHES`), beyond rounding.
     drifting : channel and number of rows of `drift`, in words.

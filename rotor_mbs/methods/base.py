@@ -214,7 +214,7 @@ def _are_all(values: object, kind: type) -> bool:
 
 
 def _are_bounds(values: object) -> bool:
-    from rotor_mbs.scenario.accuracy_bounds import Bound  # late: the command `list` needs no bounds
+    from rotor_mbs.scenario.accuracy_bounds import Bound  # not at the top: `list` needs no bounds
 
     return _are_all(values, Bound)
 

@@ -212,7 +212,7 @@ class Worker:
         ResourceError
             If the system cannot start it, or takes too long.
         """
-        from concurrent.futures import wait  # late: `rotor-mbs list` starts no process
+        from concurrent.futures import wait  # not at the top: `list` starts no process
 
         beginning: Future[_Process] | None = None
         try:
@@ -450,7 +450,7 @@ def _starter(_process_id: int) -> ThreadPoolExecutor:
     _process_id : number of the process that calls. A process that is forked off it has another
         number, and gets an executor of its own.
     """
-    from concurrent.futures import ThreadPoolExecutor  # late: `rotor-mbs list` starts no process
+    from concurrent.futures import ThreadPoolExecutor  # not at the top: `list` starts no process
 
     return ThreadPoolExecutor(1, initializer=_block_interrupts)
 

@@ -85,7 +85,8 @@ def read_in_worker(path: Path, read: Callable[[Path, T], R], argument: T) -> R:
     Exception
         What `read` raises.
     """
-    from rotor_mbs.scenario.catalogue import REFERENCES  # late: the worker does not need it
+    # Not at the top: the worker does not need it.
+    from rotor_mbs.scenario.catalogue import REFERENCES
 
     trailer = read_trailer(path)
     if is_worker() or trailer.digest in _trusted or path.parent == REFERENCES:

@@ -128,7 +128,7 @@ def is_rigid_body_inertia(inertia: Sequence[float]) -> bool:
     """
     if not any(inertia):
         return True
-    import numpy as np  # late: a point mass, as in every scene of the paper, does not need it
+    import numpy as np  # not at the top: a point mass does not need it
 
     xx, yy, zz, xy, xz, yz = inertia
     if min(xx, yy, zz) < 0.0:
@@ -390,7 +390,7 @@ class Blade:
     @property
     def inertia_tensor(self) -> NDArray[np.float64]:
         """Return the inertia tensor about the centre of mass, (3, 3) kg m²."""
-        import numpy as np  # late: reading a scene does not need it
+        import numpy as np  # not at the top: reading a scene does not need it
 
         xx, yy, zz, xy, xz, yz = self.inertia
         return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
@@ -593,7 +593,7 @@ class Scene:
         return "\n".join(lines)
 
     def _repr_html_(self) -> str:
-        from html import escape  # late: reading a scene does not need it
+        from html import escape  # not at the top: reading a scene does not need it
 
         rows = ""
         for cells in _short_keys(self):
@@ -609,7 +609,8 @@ class Scene:
 
         An example is "paper/fig11, changed: blade.mass".
         """
-        from rotor_mbs.scenario.catalogue import scene_label  # late: it imports this module
+        # Not at the top: it imports this module.
+        from rotor_mbs.scenario.catalogue import scene_label
 
         return scene_label(self)
 

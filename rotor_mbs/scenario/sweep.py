@@ -386,7 +386,7 @@ class Design:
         """Return the values of each axis, (values,)."""
         sobol = [axis.key for axis in self.axes if axis.sobol]
         if sobol:
-            from scipy.stats import qmc  # late: 0.5 s
+            from scipy.stats import qmc  # not at the top: it takes 0.5 s
 
             # All Sobol axes share one scrambled sequence of points in the unit cube. The sequence
             # is balanced if its length is a power of two. Therefore the next power of two is
