@@ -1,6 +1,6 @@
 """Define the classes of methods, of their ladders of settings, and of the solvers they build.
 
-A `Method` object has everything that the package knows about the method.
+A `Method` object describes a method completely, except for the accuracy bounds of built-in methods.
 """
 
 from __future__ import annotations
@@ -147,7 +147,7 @@ def checked_result(value: Any, kind: type, name: str, function: object, method: 
     ----------
     value : the value.
     kind : the type that the value must have.
-    name : name of the function in this package, such as "observe".
+    name : the role of the function, such as "observe", for the message.
     function : the function, or a class that is called like one.
     method : name of the method; the message begins with it if the function's file is not known.
 
@@ -246,21 +246,21 @@ class Method:
     order : order of convergence; None if it is not fixed.
     fixed_step : whether the setting `step` is the step of the whole run.
     ladders : series of settings used by `bench`.
-    relative_cost : approximate run time, divided by that of the fastest method. Expensive methods
-        are started first.
+    relative_cost : approximate run time, divided by that of the fastest method. With the duration
+        of the scene it decides in which order runs start.
     bounds : accuracy bounds of a method of another package; those of built-in methods are in
         reference/accuracy.toml.
     solve_many : (scenes, settings) -> RunBlock, several runs of a sweep computed at once; or None.
         It computes no outputs but angles, rates, tip and energy.
-    linearize : (scene, steady angles, rotor speed, rotor torque) -> Linearization; or None. One
-        method of each model has this function. It raises MethodRefusal for a state about which the
-        model cannot be linearized.
+    linearize : (scene, steady angles, rotor speed, rotor torque) -> Linearization; or None. At most
+        one method of a model has this function; the printed equations have none. It raises
+        MethodRefusal for a state about which the model cannot be linearized.
     arrays : names of optional quantities that the method stores, such as "constraint_error".
     sources : source files of a method of another package, or the text of a method file. A digest
         of them is stored with each run.
     import_engine : () -> None, called by `bench` before its first timing. It imports the packages
-        that the method needs. If the engine keeps compiled code on the disk, it must not use this
-        code, so that a cold start is timed.
+        that the method needs. If the engine caches compiled code on the disk, the function also
+        turns this cache off, so that a cold start is timed.
     """
 
     name: str
@@ -340,8 +340,8 @@ class Method:
         interval : s, time between samples.
         """
         for ladder in self.ladders:
-            # The ladder of a variant has other choices than the run: none of its points is a finer
-            # version of the run.
+            # Only the ladder with the default choices is searched. Ladders of variants have the
+            # same steps, and other choices.
             if ladder.variant:
                 continue
             for number in ladder.settings_by_value(interval):

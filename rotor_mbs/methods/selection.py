@@ -137,9 +137,9 @@ class Refusal:
     scene : name of the scene.
     method : name of the method; "" if no method was selected for the scene.
     reason : why the run is left out, in one sentence.
-    is_asked : whether the user asked for the run. A run whose method was selected by a rule counts
-        as asked for only if it is refused for its settings, and the call or the scene's file gives
-        settings of this method.
+    is_asked : whether the user asked for the run. True for a named method, and for a scene without
+        any method. For a method that a rule selected: only if the refusal is due to settings that
+        the call or the scene's file gives.
     """
 
     scene: str
@@ -274,9 +274,9 @@ _MAX_EXPLICIT_DECAY = 1e4
 # these methods take minutes, and their errors accumulate.
 _MAX_FIXED_STEP_TURN = 3e4
 # Ratio of the hub's inertia to the largest inertia of the rotor at any pitch, below which a rotor
-# with one point-mass blade is nearly singular. At a pitch of ±π/2 such a blade does not resist the
-# rotation of the shaft, as it yields in pitch. Only the hub's inertia is left there, and if it is
-# below this ratio, the rates change abruptly.
+# with one point-mass blade is nearly singular. At a pitch of ±π/2 the shaft can turn without moving
+# the mass of such a blade, because the blade turns in pitch at the same time. Only the hub's
+# inertia is left there, and if it is below this ratio, the rates change abruptly.
 _NEARLY_SINGULAR = 1e-3
 # Ratio of the same inertias below which SciPy's shortest step is too long to pass a pitch of ±π/2.
 # At a ratio of 3e-13 a run stops there with an error; at 3e-10 it passes.
@@ -314,7 +314,7 @@ def recommend(scene: Scene, defaults: tuple[str, ...]) -> tuple[tuple[str, ...],
         return (closed_form, "lagrange/radau"), reason
     # A single point-mass blade does not resist the rotation of the shaft at a pitch of ±π/2.
     has_one_point = len(scene.blades) == 1 and scene.blades[0].is_point_mass
-    if has_one_point and _leaves_zero_pitch(scene):
+    if has_one_point and _may_reach_singular_pitch(scene):
         rotor_inertia = _largest_rotor_inertia(scene)
         if scene.hub_inertia < _NO_STEP_PASSES * rotor_inertia:
             return (closed_form,), "nearly singular at a pitch of ±π/2: other methods fail there"
@@ -365,7 +365,7 @@ def fastest_rates(scene: Scene) -> tuple[float, float]:
         x, y, z = blade.centre_of_mass
         inertia = blade.pitch_inertia
         torque = max((abs(value) for _, value in torques), default=0.0)
-        # `moment` is the moment about the pitch axis in N m. Its part from the spring is that at a
+        # `moment` is the moment about the pitch axis in N m. The spring's moment is taken at a
         # deflection of 1 rad.
         acceleration = scene.gravity + driven * abs(z)
         moment = stiffness + torque + blade.mass * acceleration * math.hypot(x, y)
@@ -392,7 +392,7 @@ def singular_reason(scene: Scene) -> str:
     if all(abs(math.cos(angle)) < 1e-15 for angle in scene.initial_angles[1:]):
         at_start = "the initial mass matrix is singular"
         return f"all pitches are ±π/2 and the hub has no inertia: {at_start}"
-    if len(scene.blades) == 1 and _leaves_zero_pitch(scene):
+    if len(scene.blades) == 1 and _may_reach_singular_pitch(scene):
         return (
             "one point-mass blade on a hub without inertia: the mass matrix is singular at a pitch "
             "of ±π/2, where the motion ends; allowed: a hub with inertia"
@@ -412,8 +412,11 @@ def _largest_rotor_inertia(scene: Scene) -> float:
     return total
 
 
-def _leaves_zero_pitch(scene: Scene) -> bool:
-    """Return whether the first blade's pitch may leave zero, and no spring keeps it below ±π/2."""
+def _may_reach_singular_pitch(scene: Scene) -> bool:
+    """Return whether the first blade's pitch may reach ±π/2.
+
+    That is so if it may leave zero, and its bearing has no spring.
+    """
     _, y, _ = scene.blades[0].centre_of_mass
     starts_at_zero = scene.initial_angles[1] == 0.0 and scene.initial_rates[1] == 0.0
     leans = scene.blades[0].cone != 0.0 or (scene.shaft_tilt != 0.0 and scene.gravity != 0.0)

@@ -21,7 +21,7 @@ from rotor_mbs.solution.trajectory import (
     shape_fault,
 )
 
-_OBSERVING_S = 1.0  # least time for taking the samples, s, even if the time limit is reached
+_OBSERVING_S = 1.0  # time in s that taking the samples may always take, even after the time limit
 
 
 @caller_signals()

@@ -40,7 +40,8 @@ class TaskEnd(Generic[T, R]):
     ----------
     task : the task.
     value : result of the task; None if it has none.
-    failure : "timed_out", "worker_died" or "error" if the task has no result; otherwise "".
+    failure : why the task failed: "timed_out", "worker_died" or "error"; "" if it did not.
+        `runs.runner` adds further failures, and the stored rows as `value`.
     message : cause of the failure in one line; "" if the task has a result.
     error : error that the task raised, or that the system caused for lack of memory, files or
         processes; otherwise None.
@@ -73,7 +74,7 @@ class TaskPool(ABC):
         """Return the future of `work(task)`; `timeout_s` is its time limit in s."""
 
     def failure(self, error: BaseException) -> str:
-        """Return why a future failed: "timed_out", "worker_died", or "error" raised by the task."""
+        """Return why a future failed: "timed_out", "worker_died", or "error" if the task raised."""
         return error.failure if isinstance(error, TaskLostError) else "error"
 
     def close(self) -> None:  # noqa: B027  (a pool in this process has nothing to end)
@@ -244,8 +245,8 @@ def run_in(
     """Call `work(task)` for all tasks in an open pool, and yield the end of each.
 
     If a task exceeds its time limit, or its worker dies, it is split if possible, and its parts are
-    run in its place. A task that cannot be split is run once more if its worker died: at the end,
-    alone.
+    run instead, after the other tasks. After the death of a worker the parts, or the task itself if
+    it cannot be split, are run last and one at a time.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
-"""Define the design of a results file: requested runs, the tables of the file, their columns.
+"""Define what a results file contains: the requested runs, the tables, and their columns.
 
-The design is what is known of a row before it is computed: scene, method, settings, versions. The
-columns of the design are called known. All other columns are called computed: they are filled in
+Columns that are known before a row is computed have its scene, method, settings and versions; they
+are called known columns, or the design. All other columns are called computed: they are filled in
 row by row.
 """
 
@@ -24,16 +24,16 @@ from rotor_mbs.solution.quantities import DEFECT, LOADS, SCALES, quantities, sca
 from rotor_mbs.solution.status import STATUSES
 
 MISSING = -1  # status of a row that is not stored
-# A run has a row in /runs and a row in the table of its scene's arrays. The second row repeats the
-# columns that are named on the left. When both rows are joined, the repeated columns get the names
-# on the right.
+# A run has a row in /runs and a row in the table of its scene's arrays. The second row has copies
+# of the columns on the left, under the same names. `TableFile.place` joins both rows into one;
+# there the copies have the names on the right.
 STATUS_COPIES = {"status": "status_repeated", "samples": "samples_repeated"}
 # Type of a column of computed texts. The column has the shape (run, characters): each text is
 # UTF-8 bytes, filled up with zeros.
 CHARACTER = "S1"
 RUNS = "runs"
-# Arrays of a frozen reference: angles, rates, and arrays that would lose precision if they were
-# derived from angles and rates.
+# Arrays of a frozen reference: angles, rates, and arrays that cannot be derived from angles and
+# rates, or only with a loss of precision.
 REFERENCE_ARRAYS = (
     "angles",
     "rates",
@@ -59,8 +59,8 @@ def flags(names: Sequence[str], first: int = 0) -> dict[str, Any]:
     }
 
 
-# Computed columns of rows that precede those of the metrics, in the order of the file. Each has the
-# names of the tables that store it.
+# Computed columns before those of the metrics, in the order of the file. Each has the names of the
+# tables that store it.
 _OUTCOME_VALUES = {
     "status": RowValue(
         "1",
@@ -123,7 +123,7 @@ _OUTCOME_VALUES = {
         "s", "largest step of the ladder with an error of at most 1e-6 rad", "stability"
     ),
 }
-# Computed columns of rows that follow those of the metrics. The checksum is the last.
+# Computed columns after those of the metrics. The checksum is the last.
 _CHECKSUM_VALUES = {
     "code": RowValue(
         "1",
@@ -273,7 +273,8 @@ def arrays_of(run: RunRequest) -> dict[str, Column]:
 
     Parameters
     ----------
-    run : the request. The outputs of its scene and its method decide which arrays are stored.
+    run : the request. Its method, and the outputs that its scene requests, decide which arrays are
+        stored.
     """
     method = find_method(run.method)
     outputs = run.scene.outputs

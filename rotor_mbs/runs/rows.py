@@ -125,7 +125,7 @@ class RowLocation:
     def _open_to_write(self) -> Iterator[IO[bytes]]:
         """Open the file, and close it after the block.
 
-        Raises StoreError if the file has been replaced, and for an error of the block.
+        Raises StoreError if the file has been replaced, or for an OSError in the block.
         """
         with store_errors(self.path), self.path.open("r+b") as file:
             if os.fstat(file.fileno()).st_ino != self.inode:

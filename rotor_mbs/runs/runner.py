@@ -1,8 +1,8 @@
 """Compute rows of a table: send tasks to worker processes, and write their rows to the file.
 
-In the parent process `run_tasks_references_first` calls `run_tasks`, which calls `pool.run_in`,
-which calls `TaskPool.submit` for each task. In the worker process `run_in_worker` calls
-`RunTask.perform`.
+In the parent process `run_tasks_references_first` calls `run_tasks`, which calls `run_in` of
+`processes.pool`, which calls `TaskPool.submit` for each task. In the worker process `run_in_worker`
+calls the task's `perform`.
 """
 
 from __future__ import annotations
@@ -29,7 +29,8 @@ _REPORTED = ("status", "message", "run_time_s")
 class RunOutcome:
     """The outcome of a run, or of another part of a study such as a curve of a bench.
 
-    The call has computed the run, could not compute it, or found it in the file.
+    The function call that returns it has computed the run, tried to compute it, or found it in the
+    file.
 
     Attributes
     ----------
@@ -41,7 +42,7 @@ class RunOutcome:
     seconds : run time in s; NaN if nothing was timed.
     is_stored : whether the file has the row. If it has not, a repeated call tries again.
     is_computed : whether this call computed the run, or tried to. If not, it was stored before.
-    is_shipped : whether the run is a reference that was read from a shipped file.
+    is_shipped : whether this call read the run, a reference, from a shipped file.
     share : share of the call's whole work that was done when this run ended, from 0 to 1.
     """
 
@@ -134,7 +135,7 @@ def run_tasks(pool: TaskPool, tasks: Iterable[T]) -> Iterator[TaskEnd[T, Rows]]:
     """Compute tasks in a pool and store their rows.
 
     The worker writes the rows if it sees the file; otherwise this process writes them. The rows of
-    a task are in the file before its end is yielded.
+    a task are in the file before its TaskEnd is yielded.
 
     Parameters
     ----------

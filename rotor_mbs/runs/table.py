@@ -11,7 +11,7 @@ versions, see `runs.design`) are written with the layout, and the digest in the 
 covers them (`runs.trailer`). The computed columns have a checksum per row (`runs.rows`).
 
 The HDF5 library writes nothing after the layout. A handle of the library that is open while rows
-are written reads old values. If the library wrote, it would overwrite the new rows with these.
+are written reads old values. If it wrote, it would overwrite the new rows with the old values.
 """
 
 from __future__ import annotations
@@ -98,7 +98,7 @@ class StoredTable(TableSpec):
         return {name: column for name, (column, _) in self.known.items()} | {**self.computed}
 
     def column(self, name: str) -> NDArray[Any]:
-        """Return a column or a scale of the table, (rows, ...).
+        """Return a column of the table, (rows, ...), or a scale in its own shape.
 
         A computed column is a memory map of the file: its values are read when it is indexed.
 
@@ -164,7 +164,7 @@ class StoredTable(TableSpec):
         return statuses
 
     def clear(self) -> None:
-        """Write blank values into all rows of a new file, except the statuses."""
+        """Write blank values into this table of a new file, into all columns except the status."""
         with self.path.open("r+b") as file:
             for name, blank in blank_rows(1, self.row_type).items():
                 if name == "status":

@@ -34,7 +34,7 @@ Metrics = dict[str, float]
 
 @dataclass(frozen=True)
 class RowValue:
-    """Declare a computed value, a number or a text, in the row of a run or of a point in a file.
+    """The declaration of a column: a computed number or text that a row of runs or points has.
 
     Attributes
     ----------
@@ -258,8 +258,8 @@ def metrics_of(
     scene, run : the scene and the samples of the run. A run without samples has no metrics.
     reference : samples of the scene's reference; None if it has none.
     defects : interval defects of the run; None if they are not computed.
-    is_corrected : whether the method of the run solves the corrected equations. The defects are
-        computed with these equations: only then their sum predicts the error of the run.
+    is_corrected : whether the method of the run solves the corrected equations. Defects are
+        computed with these equations, so they predict the error only of such a run.
     """
     metrics: Metrics = {}
     if not len(run.time):
@@ -355,15 +355,15 @@ def defect_metrics(
 
 
 def worst_interval(defects: Defects, *, is_corrected: bool = True) -> int:
-    """Return the number, from 0, of the interval whose defect is furthest beyond its bound.
+    """Return the index of the interval with the largest value in units of the bound.
 
-    The interval with the largest defect is returned if no defect is beyond rounding, or if the run
-    does not claim the corrected equations.
+    The interval with the largest defect is returned if no defect is beyond rounding, or if the
+    method of the run does not solve the corrected equations.
 
     Parameters
     ----------
     defects : interval defects of the run.
-    is_corrected : whether the run claims the corrected equations.
+    is_corrected : whether the method of the run solves the corrected equations.
     """
     judged = defects.judged_sizes if is_corrected else np.zeros(1)
     return int(judged.argmax()) if judged.any() else int(defects.sizes.argmax())

@@ -110,7 +110,8 @@ class RunTask(Task):
         if self.reference is not None:
             reference = read_reference(self.reference, request.scene)
         run, false_success = _judged(run, reference, end)
-        # A shipped reference that was stopped before it was shipped has no time limit of this call.
+        # If a shipped reference ends early because its own computation was stopped, the time limit
+        # of this call did not end it: NaN is stored.
         was_stopped_before = shipped is not None and shipped.integration.out_of_time
         is_over = run.status == "timed_out" and not was_stopped_before
         limit = self.time_limit_s if is_over else np.nan
@@ -311,8 +312,8 @@ def solve_judged(
     scene, method : the scene, and the name of the method.
     settings : settings of the method, which override the scene's own settings.
     compute_reference : whether a reference is computed if none is shipped.
-    time_limit_s : time limit in s of the whole call: first of the run, then of the reference, then
-        of the judging.
+    time_limit_s : time limit in s of the whole call. The run may use all of it, the reference what
+        the run leaves, and the judging what both leave.
 
     Returns
     -------
@@ -403,7 +404,8 @@ def next_to_try(scene: Scene, method: str, settings: Mapping[str, object], statu
 
     Parameters
     ----------
-    scene : the scene; steps of a ladder are at most the interval between its samples.
+    scene : the scene. Its interval between samples gives the steps of the ladder, which are shares
+        of it.
     method, settings : method and settings of the run.
     status : status of the run; there is advice only for "inaccurate".
     """
