@@ -349,8 +349,8 @@ class Method:
                 lower: dict[str, object] = {}
                 for name, value in finer.items():
                     current = settings[name]
-                    # A value that is lower by less than 1 % is not finer: the run may have a value
-                    # that `next to try` has printed, rounded to three digits.
+                    # A value that is lower by less than 1 % is not finer. The user may have copied
+                    # the value of the run from printed advice, which rounds to three digits.
                     if isinstance(current, int | float) and value < 0.99 * current:
                         lower[name] = value
                 # The first setting is the step or the relative tolerance. If it is not lower, the

@@ -137,9 +137,9 @@ class Refusal:
     scene : name of the scene.
     method : name of the method; "" if no method was selected for the scene.
     reason : why the run is left out, in one sentence.
-    is_asked : whether the user asked for the run. True for a named method, and for a scene without
-        any method. For a method that a rule selected: only if the refusal is due to settings that
-        the call or the scene's file gives.
+    is_asked : whether the user asked for the run. It is true for a named method, and for a scene
+        without any method. For a method that a rule selected, it is true only if the call or the
+        scene's file gives settings of this method, and the settings do not fit the scene.
     """
 
     scene: str
@@ -264,8 +264,8 @@ def selected_methods(
 
 # The rule
 
-# Largest angular frequency (rad/s) at which methods with explicit steps of the default fixed size
-# (at most 1e-3 s) stay within their bounds.
+# Largest angular frequency (rad/s) at which explicit methods with fixed steps stay within their
+# bounds, if the step is their default (at most 1e-3 s).
 _MAX_EXPLICIT_SWING = 90.0
 # Product of decay rate and duration above which stability, not accuracy, limits the step of an
 # explicit method.
@@ -276,7 +276,7 @@ _MAX_FIXED_STEP_TURN = 3e4
 # Ratio of the hub's inertia to the largest inertia of the rotor at any pitch, below which a rotor
 # with one point-mass blade is nearly singular. At a pitch of ±π/2 the shaft can turn without moving
 # the mass of such a blade, because the blade turns in pitch at the same time. Only the hub's
-# inertia is left there, and if it is below this ratio, the rates change abruptly.
+# inertia then resists the rotation, and if it is too small, the rates change abruptly.
 _NEARLY_SINGULAR = 1e-3
 # Ratio of the same inertias below which SciPy's shortest step is too long to pass a pitch of ±π/2.
 # At a ratio of 3e-13 a run stops there with an error; at 3e-10 it passes.
@@ -415,7 +415,7 @@ def _largest_rotor_inertia(scene: Scene) -> float:
 def _may_reach_singular_pitch(scene: Scene) -> bool:
     """Return whether the first blade's pitch may reach ±π/2.
 
-    That is so if it may leave zero, and its bearing has no spring.
+    The result is false if the pitch stays at zero, or if its bearing has a spring.
     """
     _, y, _ = scene.blades[0].centre_of_mass
     starts_at_zero = scene.initial_angles[1] == 0.0 and scene.initial_rates[1] == 0.0

@@ -41,7 +41,8 @@ class TaskEnd(Generic[T, R]):
     task : the task.
     value : result of the task; None if it has none.
     failure : why the task failed: "timed_out", "worker_died" or "error"; "" if it did not.
-        `runs.runner` adds further failures, and the stored rows as `value`.
+        `runs.runner` also uses other failures. Its TaskEnd of a failed task can have a `value`: the
+        rows that were stored for the task.
     message : cause of the failure in one line; "" if the task has a result.
     error : error that the task raised, or that the system caused for lack of memory, files or
         processes; otherwise None.
@@ -319,7 +320,8 @@ def _end_of(task: T, future: Future[R], pool: TaskPool) -> TaskEnd[T, R]:
     Returns
     -------
     TaskEnd
-        Its `error` is set only if the task itself or the system caused it.
+        Its `error` is None if the task has a result, or was lost because its worker was ended or
+        died.
     """
     error = CancelledError() if future.cancelled() else future.exception()
     if error is None:

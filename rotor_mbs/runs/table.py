@@ -136,7 +136,8 @@ class StoredTable(TableSpec):
         ----------
         name : name of the column or the scale.
         rows : numbers of the rows.
-        sample : number of the sample that is returned of an array over time; None for all samples.
+        sample : number of a sample. If it is given, the column must be an array over time, and only
+            this sample of each row is returned. None for all samples.
 
         Raises
         ------
@@ -332,7 +333,7 @@ class TableFile:
 _opened: dict[tuple[Path, Path, tuple[int, ...]], TableFile] = {}
 _opened_lock = threading.Lock()  # held while `_opened` is used
 _MAX_OPENED = 4  # number of files whose tables are kept in memory
-# Time in ns: two writes to a file that are further apart have different time stamps.
+# Time in ns. If two writes to a file are further apart than this, their time stamps differ.
 _SETTLED_NS = 100_000_000
 
 

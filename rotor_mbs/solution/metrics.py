@@ -42,8 +42,9 @@ class RowValue:
     tables : names of the tables that have it, separated by blanks: "runs", "bench", "stability",
         "sweep", and "sweep_growth" for sweeps that request the error growth.
     kind : NumPy type of the column in the file; "S1" for a text.
-    rounding : factor that decides how far the value may differ on other hardware: by this factor
-        times `FLOOR_SAFETY` times the run's `defect_floor`.
+    rounding : factor of the difference that is allowed between values from different hardware. The
+        difference may be this factor times `FLOOR_SAFETY` times the run's `defect_floor`; for
+        `defect_drift` it may be larger by the error growth, too.
     is_main : whether the summary of a run in Python shows it.
     """
 
@@ -355,7 +356,7 @@ def defect_metrics(
 
 
 def worst_interval(defects: Defects, *, is_corrected: bool = True) -> int:
-    """Return the index of the interval with the largest value in units of the bound.
+    """Return the index of the interval with the largest of `Defects.judged_sizes`.
 
     The interval with the largest defect is returned if no defect is beyond rounding, or if the
     method of the run does not solve the corrected equations.

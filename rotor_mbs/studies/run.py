@@ -74,8 +74,8 @@ class RunTask(Task):
     def perform(self) -> Rows:
         """Solve and judge the run, and return its row.
 
-        A shipped reference is read instead of computed. An error of the method is not raised, apart
-        from those below: it becomes the status of the run.
+        A shipped reference is read instead of computed. An error that the method raises becomes the
+        status of the run; only the errors below are raised.
 
         Raises
         ------
@@ -133,7 +133,7 @@ class RunTask(Task):
 
 
 def work_of(scene: Scene, method: str) -> float:
-    """Return the rough amount of work of a run, by which tasks and progress are planned.
+    """Return the rough amount of work of a run, for the order of tasks and the shown progress.
 
     The integration of 10 s of a scene by the fastest method counts as 1. A constant is added for
     building, judging and storing.
@@ -285,8 +285,8 @@ def missing_runs(
                 method=run.method,
                 place=place,
                 reference=reference,
-                # The process is ended later than the run stops itself, because it also loads the
-                # engine, compiles code and writes the row.
+                # The run stops itself at the time limit. The limit for the process is longer,
+                # because the process also loads the engine, compiles code and writes the row.
                 kill_after_s=1.2 * timeout_s + 10.0,
                 work=work_of(run.scene, run.method),
                 request=run,
@@ -312,8 +312,8 @@ def solve_judged(
     scene, method : the scene, and the name of the method.
     settings : settings of the method, which override the scene's own settings.
     compute_reference : whether a reference is computed if none is shipped.
-    time_limit_s : time limit in s of the whole call. The run may use all of it, the reference what
-        the run leaves, and the judging what both leave.
+    time_limit_s : time limit in s of the run, the reference and the judging, in this order. Each of
+        them may use the time that is left. The judging may take _JUDGING_S even if less is left.
 
     Returns
     -------
@@ -404,8 +404,7 @@ def next_to_try(scene: Scene, method: str, settings: Mapping[str, object], statu
 
     Parameters
     ----------
-    scene : the scene. Its interval between samples gives the steps of the ladder, which are shares
-        of it.
+    scene : the scene. The steps of the ladder are shares of its sample interval.
     method, settings : method and settings of the run.
     status : status of the run; there is advice only for "inaccurate".
     """
