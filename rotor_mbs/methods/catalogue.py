@@ -142,7 +142,7 @@ def is_corrected(name: str) -> bool:
 
 
 def default_methods() -> tuple[str, ...]:
-    """Return the names of the default methods.
+    """Return the names of the methods in the default selection (`Method.is_default`).
 
     A default method that is not installed is replaced by its fallback.
     """

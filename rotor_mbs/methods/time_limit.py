@@ -5,7 +5,8 @@ handler of SIGALRM raises the exception, which also ends code that never asks fo
 threads, and on Windows, the code must call `raise_if_over` or `is_over`.
 
 The exception would lose the samples computed so far. Code that keeps its samples runs in a block of
-`samples_kept_at_limit`, which prevents the exception, and calls `is_over` between steps.
+`samples_kept_at_limit`, in which the exception is not raised. The code calls `is_over` between
+steps.
 
 A process has one handler for SIGALRM and one timer, ITIMER_REAL. The caller of this package may use
 both, as pytest-timeout does. While a block is active, this module shares them with the caller: it
@@ -110,8 +111,9 @@ def raise_if_over() -> None:
 def step_callback() -> Callable[[object], bool] | None:
     """Return a function that an engine calls after every step to learn whether to go on.
 
-    Python handles signals during the call. But each call takes time: if no alarm can come, neither
-    of a limit nor of the caller, None is returned. The engine runs in `samples_kept_at_limit`.
+    Python handles signals during the call. But each call takes time: None is returned if no limit
+    is active and the caller has set no alarm. The engine must run in a block of
+    `samples_kept_at_limit`.
     """
     has_alarm = bool(_limits.stack)
     if not has_alarm and _handles_signals() and hasattr(signal, "getitimer"):
@@ -158,7 +160,8 @@ class _Limit:
         # and the limits around it.
         self.end = self.until = math.inf
         self.is_polled = False  # whether the code in the block calls `is_over` itself
-        # Whether the code in the block knows that it is over its limit, and is not interrupted.
+        # Whether the code in the block knows that it is over its limit. No alarm then
+        # interrupts the code.
         self.is_known = False
         self.has_fired = False  # whether the alarm of this limit has been handled
         self.frame: FrameType | None = None  # frame of the function that has the block
@@ -201,7 +204,7 @@ class _HandlerError(BaseException):
     """Carry an exception of the caller's signal handler past every `except Exception`.
 
     Such a clause does not catch this class, which is not a subclass of Exception. The exception
-    that it carries is raised at the end of the block of `caller_signals`.
+    that it carries is raised at the end of the outermost block, of `caller_signals` or of a limit.
     """
 
     def __init__(self, error: BaseException) -> None:
@@ -270,7 +273,8 @@ class _Signals:
                 elif callable(handler):
                     self._handlers[number] = handler
                     signal.signal(number, _on_signal)
-            self._depth = 1  # from now on no handler interrupts what begins or ends a block
+            # All handlers are ours now. They raise nothing in code that begins or ends a block.
+            self._depth = 1
         except BaseException:
             self._restore_handlers()
             raise
@@ -296,7 +300,7 @@ class _Signals:
             try:
                 raise raised
             finally:
-                raised.__context__ = context  # as the handler raised it
+                raised.__context__ = context  # `raise raised` may have changed it
 
     def _restore_handlers(self) -> None:
         try:
@@ -318,7 +322,7 @@ class _Signals:
         return _ALARM in self._handlers
 
     def share_timer(self) -> None:
-        """Store the caller's due time, and set the timer to the next due time of all."""
+        """Store the caller's due time, and set the timer to the next due time by `arm`."""
         if not self.has_alarm:
             return
         if not self._shares_timer:
@@ -347,7 +351,7 @@ class _Signals:
         )
 
     def give_timer_back(self, handler: Any = None) -> None:
-        """Set the timer to the rest of the time after which the caller's alarm is due.
+        """Set the timer to the time that is left until the caller's alarm is due.
 
         If the caller's alarm is due already, the timer is set to come at once.
 
@@ -455,10 +459,11 @@ class _Signals:
             raise _passing(error) from None
 
     def on_unraisable(self, unraisable: sys.UnraisableHookArgs) -> None:
-        """Set the timer to raise an error again that this module has raised and Python has ignored.
+        """Handle an error that Python ignores: if this module raised it, it is raised again.
 
-        Python ignores errors in the callback of a weak reference, for example. Errors that this
-        module has not raised are passed to the caller's `sys.unraisablehook`.
+        The timer is set for this, and `on_alarm` raises the error. Python ignores errors in the
+        callback of a weak reference, for example. Errors that this module has not raised are passed
+        to the caller's `sys.unraisablehook`.
 
         Parameters
         ----------
@@ -481,7 +486,7 @@ class _Signals:
 def _passing(error: BaseException) -> BaseException:
     """Return an exception in a form that neither `except Exception` nor our own code catches.
 
-    Exceptions that are not caught anyway are returned unchanged.
+    An exception that neither of them would catch, such as KeyboardInterrupt, is returned unchanged.
     """
     return _HandlerError(error) if isinstance(error, Exception | SystemExit) else error
 

@@ -38,7 +38,8 @@ for _folder in (SCENARIOS, REFERENCES):
     if not _folder.is_dir():
         raise RotorError(f"{_folder}: the folder is missing; install rotor_mbs again")
 
-# Ending of the names of mapping files of columns. Every other TOML file in a folder is a scene.
+# Ending of the names of files that map columns of another program's data to channels. Every other
+# TOML file in a folder counts as a scene.
 MAPPING_ENDING = ".columns.toml"
 _NO_MOTION = ("samples", "outputs")  # keys that change what is stored, not how the rotor moves
 _SHOWN_CHANGES = 3  # largest number of keys in the label of a changed scene
@@ -236,7 +237,10 @@ def label_with_changes(name: str, changes: Iterable[SceneChange]) -> str:
 
 
 def moves_as_shipped(changes: Iterable[SceneChange] | None) -> bool:
-    """Return whether a scene with these `changes_from_shipped` moves as the shipped scene."""
+    """Return whether these `changes_from_shipped` concern at most the samples and the outputs.
+
+    The scene then moves as the shipped scene. Returns False if `changes` is None.
+    """
     return changes is not None and all(change.path[0] in _NO_MOTION for change in changes)
 
 

@@ -271,7 +271,8 @@ def restricted(
     is_right : (value, as `kind` returns it) -> whether it is allowed.
     allowed : the allowed values in words.
     what : the message for a value that `is_right` refuses; {} stands for the value.
-    allowed_there : the allowed values in words after `what`; "" if they are `allowed` there, too.
+    allowed_there : the allowed values in words, for the error with the message `what`. If it is "",
+        the error has the words of the key's declaration.
     """
 
     def read(value: object) -> Any:

@@ -64,23 +64,24 @@ if TYPE_CHECKING:
 
 DEFAULT_OUTPUTS = ("angles", "rates", "tip", "energy")
 OUTPUTS = (*DEFAULT_OUTPUTS, "loads")  # the built-in outputs
-# Another package adds an output by an entry point in this group, which has the output's name.
+# Another package adds an output by an entry point in this group. The entry point has the name of
+# the output.
 ENTRY_POINT_GROUP = "rotor_mbs.quantities"
 
-# One attribute of an HDF5 file has the labels of all coordinates. It has no room for 4,000.
+# The labels of all coordinates are one attribute of an HDF5 file, which has room for about 4,000.
 MAX_BLADES = 1000
 MAX_SAMPLES = 10_000_000
 MAX_SAMPLE_BYTES = 2 << 30
 MAX_CONE = 1.5  # rad
-# Most keys of a scene that are shown on a screen, and most entries of a list that are shown.
+# Largest number of keys of a scene, and of entries of a list, that are shown on a screen.
 _SHOWN_KEYS, _SHOWN_ENTRIES = 30, 6
 # A second moment of mass may be negative by this share of the inertia's trace. A flat body has a
 # second moment of zero, which is slightly negative if the inertia is typed with ten digits. The
 # share is far above the round-off of the eigenvalues (1e-15).
 INERTIA_TOLERANCE = 1e-9
 
-# (values of a file by field) -> problems of the values that another layer checks: the methods and
-# their settings.
+# (values of a file by field) -> problems of the methods and settings among these values. A layer
+# above checks them, because this layer does not know the methods.
 ValuesCheck = Callable[[Mapping[str, Any]], list[KeyProblem]]
 
 # What a field means to a run. label: texts, and the methods and settings to use; run: duration,
@@ -406,8 +407,9 @@ class Blade:
         -------
         tuple
             Elements xx yy zz xy xz yz of the tensor J_com + m (r·r I - r rᵀ), kg m², in the blade
-            frame. The moment of inertia about the pitch axis is zz. That of a blade without cone
-            about the shaft is xx sin²θ + yy cos²θ + 2 xy sin θ cos θ at a pitch of θ.
+            frame. The moment of inertia about the pitch axis is zz. For a blade without cone at
+            the pitch θ, the moment of inertia about the shaft is
+            xx sin²θ + yy cos²θ + 2 xy sin θ cos θ.
         """
         m = number(self.mass)
         x, y, z = map(number, self.centre_of_mass)
@@ -609,7 +611,7 @@ class Scene:
 
         An example is "paper/fig11, changed: blade.mass".
         """
-        # Not at the top: it imports this module.
+        # Not at the top: the functions of the catalogue import this module.
         from rotor_mbs.scenario.catalogue import scene_label
 
         return scene_label(self)
@@ -783,8 +785,9 @@ _COUNT = file_key(
     "1",
     ": blade i at 2 pi (i - 1)/blades about the shaft",
 )
-# Keys are read in this order, in which `new_scene_text` lists them, too. The number of blades is no
-# field of `Scene`; it comes before the keys that depend on it.
+# The keys of each table are read in this order, those at the top of the file first. The template of
+# `new_scene_text` has the same order. The number of blades is no field of `Scene`; it comes before
+# the keys that depend on it.
 SCENE_KEYS = {
     "title": _FIELD_KEYS["title"],
     "figures": _FIELD_KEYS["figures"],
@@ -805,7 +808,7 @@ _rotor_values = attrgetter(*(field.name for field in scene_fields("rotor")))
 
 
 def scene_hash(scene: Scene) -> str:
-    """Return the SHA-256, in hexadecimal, of the values of a scene that determine its motion.
+    """Return the SHA-256, in hexadecimal, of the values of a scene that determine its results.
 
     The hash covers the numbers of the scene, bit for bit, and the outputs. It does not cover fields
     whose role is "label", nor the tip if its path is not an output.
@@ -909,7 +912,9 @@ def scene_from_tables(
 
 
 def scene_tables(scene: Scene) -> dict[str, Any]:
-    """Return the scene as tables of a scene file, without keys that have their default.
+    """Return the scene as tables of a scene file.
+
+    A key is left out if its field has a default and is equal to it.
 
     Parameters
     ----------
@@ -943,7 +948,8 @@ def _blade_tables(scene: Scene) -> dict[str, Any] | list[dict[str, Any]]:
     written = []
     for blade in scene.blades[:1] if are_equal else scene.blades:
         table = {key: _listed(getattr(blade, key)) for key in BLADE_KEYS}
-        # A tip that is not needed and equals the centre of mass was not in a file.
+        # If a file has no tip, `_read_blades` sets the tip to the centre of mass. Such a tip is
+        # left out.
         if blade.tip == blade.centre_of_mass and not scene.wants("tip"):
             del table["tip"]
         if not blade.cone:

@@ -25,7 +25,7 @@ MAX_PROBLEMS = 100
 
 # For a dotted key, the time and memory of the TOML reader grow with the square of the number of
 # parts: 1 MiB of "a.a.a." would need terabytes. No key of a scene has more than two parts. The
-# lookbehind in `_LONG_KEY` keeps the time of this search proportional to the length of the text.
+# lookbehind in `_LONG_KEY` keeps the time of a search for long keys proportional to the text.
 _MAX_KEY_PARTS = 32
 _LONG_KEY = re.compile(
     r"(?<![A-Za-z0-9_-])"
@@ -54,8 +54,8 @@ _COMMANDS = {
     "a mapping of columns": "rotor-mbs compare DATA --scene SCENE --columns {}",
     "a file of bounds": "rotor-mbs check FILE --bounds {}",
 }
-# Keys of a mapping of columns, other than its tables with a `column`. A mapping that has no such
-# table has one of these keys.
+# Keys that a mapping of columns may have besides tables with the key `column`. If it has no such
+# table, it has at least one of these keys.
 _MAPPING_KEYS = frozenset(("time", "speed", "omit", "only", "program", "openfast", "group"))
 
 
@@ -355,7 +355,11 @@ def plain_value(value: Any) -> Any:
 
 
 def as_text(value: object) -> str:
-    """Return a value for a message, on one line: short values as in a TOML file, others named."""
+    """Return a value for a message, on one line.
+
+    Numbers, flags and texts are written as in a TOML file, shortened if they are long. For any
+    other value the text is its type, such as "a list".
+    """
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, int):
@@ -473,8 +477,8 @@ def find_lines(text: str) -> dict[KeyPath, int]:
 def _located(text: str) -> Iterator[tuple[KeyPath, int, Sequence[tuple[str, int]]]]:
     """Yield the path, the line number and the value's tokens of each key and each table header.
 
-    Each part of a dotted key or header is yielded first, without tokens: for `a.b = 1` the path of
-    a, then that of a.b.
+    Before that, the path of each part of the key or header is yielded without tokens: for `a.b = 1`
+    the path of a, then that of a.b, and then that of a.b with the tokens of the value.
 
     Parameters
     ----------
