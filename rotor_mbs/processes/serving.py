@@ -160,13 +160,13 @@ def is_worker() -> bool:
 def _answer(request: bytes) -> bytes:
     """Call the function in a request, and return the pickled tuple (result, error).
 
-    A result that cannot be pickled counts as an error. A RuntimeError replaces an exit, and an
-    error that cannot be pickled.
+    A result that cannot be pickled counts as an error. If the function exits, as by SystemExit, or
+    its error cannot be pickled, the error in the tuple is a RuntimeError.
 
     Parameters
     ----------
-    request : pickled tuple of the folder in which the function runs, or "", and of another pickled
-        tuple: the function and its argument.
+    request : pickled tuple (folder, call). `folder` is that in which the function runs; "" for the
+        current folder. `call` is the pickled tuple (function, argument).
     """
     try:
         with system_errors_apart():

@@ -75,7 +75,7 @@ class Worker:
     functions run in the current folder of the parent. If several threads call a worker, they take
     turns. In a process that is forked off the parent, the worker starts a process of its own.
 
-    A worker is a context manager, which closes it after the block.
+    A worker can be used as a context manager: it is closed after the block.
 
     Parameters
     ----------
@@ -86,8 +86,8 @@ class Worker:
     is_silent : whether output of the process is dropped; otherwise it goes to standard error.
     environment : values of environment variables that the process gets if they are not set in this
         process.
-    set_up_limit_s : s, time limit for the start of the process, and once more for its imports and
-        its initializer.
+    set_up_limit_s : s, time limit for the start of the process. The imports and the initializer of
+        the process together have a second limit of the same length.
 
     Examples
     --------
@@ -134,8 +134,8 @@ class Worker:
         Raises
         ------
         ResourceError
-            If this worker is closed, or the system cannot start a process. If the system has
-            reported an error, there is a pause before this one is raised.
+            If this worker is closed, or the system cannot start a process. If the system reports an
+            error, ResourceError is raised after a pause.
         """
         with self._lock:
             if self._process is not None and self._process.poll() is not None:
@@ -212,19 +212,21 @@ class Worker:
         ResourceError
             If the system cannot start it, or takes too long.
         """
-        from concurrent.futures import wait  # not at the top: `list` starts no process
+        # Not at the top: commands that start no process, such as `rotor-mbs list`, do not need it.
+        from concurrent.futures import wait
 
         beginning: Future[_Process] | None = None
         try:
             try:
-                # After an interrupt just when the executor has started its thread, the executor
-                # would not know the thread. Python would then wait for the thread at its end.
+                # The executor starts its thread, then records it. An interrupt between these steps
+                # would leave a thread that the executor never ends, and Python would wait for this
+                # thread when it exits.
                 with delayed_interrupts():
                     beginning = _starter(os.getpid()).submit(self._begin)
             except RuntimeError as exc:
                 raise _not_started(str(exc)) from exc
-            # `beginning.exception()` returns an error of the start. An error that is raised in
-            # this block, not returned, has another cause, such as an interrupt.
+            # An error of the start is returned by `beginning.exception()`. An error that `wait`
+            # raises has another cause, such as an interrupt, and is raised unchanged.
             done, _ = wait([beginning], self._set_up_limit_s)
             if not done:
                 raise _not_started(f"the system did not start it in {self._set_up_limit_s:g} s")
@@ -416,7 +418,9 @@ class _Process(subprocess.Popen[bytes]):
 
         If the parent was sending data during the fork, the child drops its copy of them.
         """
-        self.returncode = 0  # it is not a child of this process, so nothing must wait for it
+        # The worker process is not a child of this process, which therefore cannot wait for it.
+        # With an exit code set, subprocess does not try to.
+        self.returncode = 0
         for stream in (self.stdin, self.stdout):
             # Only the raw stream can be closed: a thread that the fork has not copied may hold the
             # lock of the buffer.
@@ -424,7 +428,10 @@ class _Process(subprocess.Popen[bytes]):
 
 
 def _end_begun(beginning: Future[_Process]) -> None:
-    """End a process that was started after its caller had stopped waiting."""
+    """End the process of a finished start; nothing is done if no process was started.
+
+    It is called when the caller has stopped waiting for the process, as after an interrupt.
+    """
     if not beginning.cancelled() and beginning.exception() is None:
         beginning.result().end()
 
@@ -450,7 +457,8 @@ def _starter(_process_id: int) -> ThreadPoolExecutor:
     _process_id : number of the process that calls. A process that is forked off it has another
         number, and gets an executor of its own.
     """
-    from concurrent.futures import ThreadPoolExecutor  # not at the top: `list` starts no process
+    # Not at the top: commands that start no process, such as `rotor-mbs list`, do not need it.
+    from concurrent.futures import ThreadPoolExecutor
 
     return ThreadPoolExecutor(1, initializer=_block_interrupts)
 

@@ -36,7 +36,8 @@ _LIBRARY_ATTRIBUTES = (
 # Element of a dataset of texts of variable length: the length of a text, and its location in the
 # file's heap.
 _REFERENCE = np.dtype([("length", "<u4"), ("heap", "<u8"), ("index", "<u4")])
-# Types of texts of variable length: of NumPy, of the library in memory, of the library in a file.
+# A text of variable length has three types: TEXT in a NumPy array, and two types of the HDF5
+# library, TEXT_IN_MEMORY for values in memory and TEXT_TYPE for values in a file.
 TEXT = h5py.string_dtype()
 TEXT_IN_MEMORY = h5py.h5t.py_create(TEXT)
 TEXT_TYPE = h5py.h5t.py_create(TEXT, logical=True)
@@ -72,7 +73,8 @@ class TableSpec:
     ----------
     group : path of the group in the file; "" for the root.
     runs : (rows,) unique labels or numbers of the rows: the scale of the dimension `run`.
-    known : column and values by name, for the known columns and for all scales except `run`.
+    known : column and values by name, for the known columns, whose values are known when the table
+        is laid out, and for all scales except `run`.
     computed : columns that are filled in later, in the order in which the checksum of a row covers
         them. A column without the dimension `run` belongs to the row of the reference.
     attributes : attributes of the group.
@@ -129,7 +131,8 @@ def read_groups(
     Parameters
     ----------
     path : the file.
-    kinds : kinds of files whose groups are read. Only the root is read of a file of another kind.
+    kinds : kinds of files whose groups are read. If the file is of another kind, only its root is
+        read.
     only : names of the groups to read beside the root, by default all.
 
     Returns
@@ -256,7 +259,7 @@ def open_file(path: Path) -> Iterator[tuple[Any, Trailer]]:
 
 @contextmanager
 def reading(path: Path | str, what: str = "") -> Iterator[None]:
-    """Raise errors that the content of a file causes in the block as StoreError.
+    """Convert errors that the content of a file causes in the block to StoreError.
 
     HDF5 raises errors of many types on damaged files. A forged file with a right digest may cause
     such errors, too, in the code that uses its content.
@@ -339,7 +342,7 @@ def values_of(dataset: Any) -> NDArray[Any]:
 
 
 def plain(value: Any) -> Any:
-    """Return an attribute as a plain Python value."""
+    """Return a value that h5py has read, a text or an attribute, as a plain Python value."""
     if isinstance(value, np.ndarray):
         return [plain(item) for item in value]
     if isinstance(value, bytes):

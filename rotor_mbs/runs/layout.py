@@ -237,7 +237,8 @@ def put_attributes(target: Any, values: Mapping[str, object]) -> None:
     ----------
     target : the HDF5 object.
     values : values of the attributes by name. Numbers are stored as float64 or int64, booleans as
-        int8 (netCDF-4 has no booleans), lists as texts, and arrays with their own type.
+        int8 (netCDF-4 has no booleans), lists of texts as arrays of texts, and arrays with their
+        own type.
     """
     for name, value in values.items():
         if isinstance(value, str):
@@ -289,7 +290,10 @@ def new_file(path: Path, kind: str) -> Iterator[Any]:
 
 
 def _groups_with_arrays(group: Any, path: str = "") -> Iterator[str]:
-    """Yield for each array below a group the path of the array's own group, in order of writing."""
+    """Yield the path of the group of each array, for all arrays below `group` in order of writing.
+
+    A group with several arrays is yielded several times.
+    """
     for name, item in group.items():
         if is_group(item):
             yield from _groups_with_arrays(item, f"{path}/{name}" if path else name)

@@ -28,8 +28,8 @@ def fit_file_to_request(
 
     If the file has all rows as they are requested, nothing is written. Otherwise a new file is laid
     out beside it, the rows that stay are copied into the new file, and the new file replaces the
-    old one. A requested row is missing afterwards if the stored row differs from it in the design
-    (settings, versions, the scene's numbers).
+    old one. Afterwards the status of a requested row is MISSING if the row is new, or if its known
+    values (settings, versions, the hash of the scene ...) differ from those of the stored row.
 
     Parameters
     ----------

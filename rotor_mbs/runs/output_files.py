@@ -32,8 +32,8 @@ _OWNER = rb"(process [0-9]+ on [!-~]*)?\Z"
 def locked(output: Path) -> Iterator[None]:
     """Lock a file during the block, so that no other process writes it.
 
-    The thread that has the lock may enter it again. Temporary files of the output that killed
-    processes have left are removed.
+    The thread that has the lock may enter it again. If killed processes have left temporary files
+    of the output, these files are removed.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ def locked(output: Path) -> Iterator[None]:
 
 
 def is_being_written(output: Path) -> bool:
-    """Return whether another process is writing a file, or was killed while it did."""
+    """Return whether a process, this or another, is writing a file, or was killed while it did."""
     return _lock_of(_resolved(output)).exists()
 
 

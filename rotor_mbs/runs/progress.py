@@ -2,9 +2,9 @@
 
 Progress is one line that is overwritten on a terminal or in a notebook, or plain lines in a log.
 
-The remaining time is estimated from the work of the runs, which differs a thousandfold, and the
-line of a run that failed stays. tqdm is not used: it estimates from the number of iterations, and
-needs ipywidgets in a notebook.
+tqdm is not used: it estimates the remaining time from the number of iterations, but the work of two
+runs may differ a thousandfold. It also needs ipywidgets in a notebook. Here the line of a run that
+failed stays on the terminal.
 """
 
 from __future__ import annotations
@@ -59,7 +59,8 @@ class ProgressLine:
     """A context manager that shows progress: one line on a terminal, or plain lines in a log.
 
     The line on a terminal is overwritten, and cleared at the end. The runner calls the object after
-    each run. The remaining time is estimated from the work done, not from the number of runs.
+    each run, and then the remaining time is estimated from the work done, not from the number of
+    runs. In a stage, and for the runs of a sweep, it is estimated from the number of parts done.
     """
 
     def __init__(self, stream: TextIO | None = None) -> None:

@@ -77,7 +77,8 @@ class StoredRun:
     Attributes
     ----------
     scene_name, method : name of the scene and name of the method.
-    known : known values of the row by column: settings, versions, ...
+    known : values of the row in the known columns, by column: settings, versions, ... (see
+        `runs.design`).
     scales : the scales time, coordinate, blade and axis, as far as the table has them.
     """
 
@@ -126,7 +127,8 @@ class StoredRun:
     def reference(self) -> Trajectory | None:
         """Return the samples of the reference in the file.
 
-        None is returned if the file has no reference, and if this run is the reference itself.
+        None is returned for the reference itself, for a run of a sweep, and if the file has no
+        reference whose arrays can be used.
         """
         return None if self.method == REFERENCE else self._read_reference()
 
@@ -499,7 +501,7 @@ class StoredRuns:
     labels : labels of the stored runs, in the order of `open_results`. For one scene they are the
         names of the methods, otherwise "scene/method".
     scenes : names of the scenes.
-    subsets : names of the scenes whose runs can be selected.
+    subsets : names of the scenes, each of which can be given as `scene` to select its runs.
     group : group of the arrays over time; None for several scenes.
     keys : keys of varied parameters; always empty, as only a sweep varies parameters.
     """
@@ -586,7 +588,8 @@ class StoredRuns:
         Parameters
         ----------
         name : name of the column or the scale.
-        sample : number of the sample that is returned of an array over time; None for all samples.
+        sample : for an array over time, the number of the only sample that is returned; None for
+            all samples.
 
         Raises
         ------
@@ -612,8 +615,8 @@ class StoredRuns:
 def run_arrays(path: Path, group: str = "", scene: str = "") -> dict[str, NDArray[Any]]:
     """Return the arrays of up to three dimensions of one run of a results file, by name.
 
-    `group` and `scene` select the run by its name "scene/method", as `runs.arrays.read_arrays`
-    selects a group.
+    The parameters select the run as `runs.arrays.read_arrays` selects a group; the name
+    "scene/method" of a run takes the place of the path of a group.
     """
     with open_results(path) as results:
         runs = {}
@@ -681,9 +684,9 @@ class Record:
     ----------
     kind : "bench" or "stability" (the keys of `POINT_COLUMNS`), "modes" or "comparison".
     scene : name of the scene.
-    name : name of a curve or a ladder: the method, then the settings that are constant along it
-        unless they are the defaults. For modes and comparisons it is the end of the group's path,
-        such as "data/modes".
+    name : name of a curve or a ladder: the method, then those settings that are constant along the
+        curve and differ from their defaults. For modes and comparisons the name is the end of the
+        group's path, such as "data/modes".
     attributes : further values by name.
     arrays : arrays by name. Those of a curve or a ladder have the shape (points,); `status` has
         codes of `solution.status.STATUSES`.
@@ -764,7 +767,8 @@ def _point_records(stored: StoredTable) -> Iterator[Record]:
         arrays = {column: values[row_numbers] for column, values in columns.items()}
         setting_kind = str(known.get("setting_kind", "step"))
         arrays["setting"] = arrays[setting_kind]
-        # The first row has the values of the curve as a whole. A missing number is NaN.
+        # Values that belong to the whole curve, such as its order, are taken from its first row.
+        # A number that the curve does not have is NaN.
         facts: dict[str, Any] = {}
         for column, values in arrays.items():
             if column not in ("status", "message", "setting"):

@@ -129,8 +129,8 @@ def open_sweep(
     Yields
     ------
     StoredTable, (runs,) int8
-        The table, and the status of each run, MISSING if the run is to be computed. The caller
-        enters the statuses of runs that it has stored.
+        The table, and the status of each run, MISSING if the run is to be computed. When the caller
+        has stored a run, it must set the status of the run in this array.
 
     Raises
     ------
@@ -160,7 +160,8 @@ def open_sweep(
             (statuses == code_of("timed_out")) & (stored.column("time_limit_s") < time_limit_s)
         ] = MISSING
         taken_back = np.flatnonzero((stored.column("status") != MISSING) & (statuses == MISSING))
-        stored.place().mark_missing(taken_back.tolist())  # for readers of the file, too
+        # These runs are marked as missing in the file, too, so that its readers do not use them.
+        stored.place().mark_missing(taken_back.tolist())
         if fresh:
             statuses[:] = MISSING
         try:
@@ -278,7 +279,10 @@ class StoredSweep:
 
     @property
     def title(self) -> str:
-        """Return the title that is shown for a sweep in a temporary file, in place of the path."""
+        """Return the title of the sweep, such as "sweep of paper/fig11".
+
+        It is shown in place of the path if the file is a temporary one.
+        """
         return f"sweep of {self.base_scene.label}"
 
     @contextmanager
@@ -313,7 +317,10 @@ class StoredSweep:
         return self._table.column(name)
 
     def scene_of(self, number: int) -> Scene:
-        """Return the scene of the run with a number; its samples are those that are stored."""
+        """Return the scene of the run with a number.
+
+        The number of samples of the scene is that of the stored arrays.
+        """
         row = self._row_of(number)
         values = {key: float(self.column(parameter_name(key))[row]) for key in self.keys}
         return self.base_scene.replace(**values, samples=len(self.column("time")))

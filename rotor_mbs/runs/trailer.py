@@ -32,8 +32,8 @@ MAGIC = b"rmbs-end"
 # file that has lost its trailer.
 INTEGRITY = "CRC-32 of each row; SHA-256 of the rest, behind the end of HDF5"
 RESULTS, SWEEP, MODES, COMPARISON = "results", "sweep", "modes", "comparison"
-# Beginning of the kind of a file with one split of a sweep's dataset. The name of the sweep's file
-# follows.
+# A file with one split of a sweep's dataset has a kind that begins with this text and ends with the
+# name of the sweep's file.
 SPLIT_OF = "split of "
 _KINDS = {
     RESULTS: "runs, bench or stability",
@@ -47,8 +47,8 @@ _LONGEST_JSON = 1 << 24  # bytes; the JSON of a table of 60 columns has 2,000
 _BLOCK = 1 << 20  # bytes that are read at once
 _HEAD = 1 << 24  # bytes at the beginning of a file in which its attributes are searched for
 _HDF5 = b"\x89HDF\r\n\x1a\n"
-# Bytes of a file that have the length of the HDF5 content, in the superblock that h5py writes by
-# default.
+# Position of the bytes of a file that contain the length of its HDF5 content. They are part of the
+# superblock, in the version that h5py writes by default.
 _END_OF_HDF5 = slice(40, 48)
 _UNFINISHED_NAME = re.compile(r"\..*\.[0-9]+\.tmp")  # temporary name that `replacing` gives a file
 

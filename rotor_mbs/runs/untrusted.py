@@ -33,8 +33,8 @@ TIME_S = 10.0
 TIME_OF_BYTE_S = 1e-5
 MEMORY = 1 << 30
 MEMORY_OF_BYTE = 16
-# Time in s by which the limit of elapsed time exceeds that of processor time, as the worker may
-# have to wait. The limit of elapsed time is the only one if the system cannot limit processor time.
+# Elapsed time is limited, too, for systems that cannot limit processor time. Its limit is longer
+# than the limit of processor time by this time in s, as the worker may have to wait.
 _WAIT_S = 300.0
 _SET_UP_S = 60.0  # time limit for the start of the worker in s
 _TRIES = 2  # number of attempts to read a file if the worker is killed from outside
