@@ -1,8 +1,8 @@
 """Check a results file, as `rotor-mbs check` does: compare numbers with bounds.
 
 Each check has a hint to the cause of a failure. The numbers of a run are computed again from its
-stored samples, and its stored metrics and status are compared with them. Only the check "published"
-compares stored metrics with the paper's numbers.
+stored samples, and its stored metrics and status are compared with them. One check, "published",
+compares the stored metrics with the paper's numbers instead.
 """
 
 from __future__ import annotations
@@ -49,8 +49,9 @@ from rotor_mbs.solution.metrics import (
 from rotor_mbs.solution.status import COMPLETE
 from rotor_mbs.solution.trajectory import Solution, Trajectory
 
-# Allowed difference of an extreme at ode45's own output points from the stored one, relative, or
-# rad and rad/s below 1. ode45 has other output points if it is started again from a sample.
+# Allowed difference between a stored extreme at ode45's own output points and the extreme that is
+# computed again: relative, or absolute (rad, rad/s) for an extreme below 1. The two differ because
+# ode45 has other output points if it is started again from a sample.
 _READ_OFF = 1e-3
 # Largest number of intervals in which a peak of the rate is searched for, in a run of the printed
 # equations.
@@ -93,7 +94,8 @@ def checks_of(results: OpenResults, frozen: Sequence[OpenResults], bounds: Bound
                     bounded(own, "integrity", _where(run, "row"), run.is_damaged, "rows", hint)
                 )
                 try:
-                    # If a row is known to be damaged, the damage is the cause of any error in it.
+                    # If the checksum of a row is wrong, `reading` raises any exception as
+                    # StoreError, because the damage is its cause.
                     with reading(str(scene.name), run.method) if run.is_damaged else nullcontext():
                         faults, solution = run.faults(), run.solution()
                         checks += _of_run(
@@ -234,7 +236,7 @@ def _changed_metric(run: StoredRun, metrics: Metrics, solution: Solution) -> tup
     str
         Name of the metric.
     float
-        Relative difference; 0 if the differences of all metrics are within rounding.
+        Relative difference; 0 if no metric differs by more than its allowance.
     str
         Text with both values.
     """
@@ -389,8 +391,9 @@ def _of_reference(scene: StoredScene, shipped: StoredRun | None, bounds: Bounds)
                 first, off = shipped.array(name), math.nan
                 second = stored.array(name) if name in stored else np.empty(0)
                 if first.shape == second.shape and second.dtype.kind == "f":
-                    # Compare the samples at which the shipped value is positive and finite. A
-                    # stored value there that is not makes the result infinite or NaN, and fails.
+                    # Compare the samples at which the shipped value is positive and finite. If the
+                    # stored value of such a sample is not positive and finite, `off` is infinite or
+                    # NaN, so that the check fails.
                     used = np.isfinite(first) & (first > 0.0)
                     off = float(np.abs(np.log(second[used] / first[used])).max(initial=0.0))
                 yield bounded(

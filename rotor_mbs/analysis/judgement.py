@@ -1,18 +1,20 @@
 """Judge a run by its samples, with the checks and bounds of `rotor-mbs check`.
 
-A run is ok if it reaches the end of the scene and passes these checks:
+A run must reach the end of the scene and pass these checks:
 
 - Sample times and initial state equal those of the scene.
 - Tips and energies agree with the angles and rates of the run.
 - Loads agree with those of the closed form at the states of the run.
+- Joint gaps, and quantities of other packages, are within their bounds.
 - The defect of every interval is within the method's bound.
 - The energy balance is kept.
 - The angle error up to the horizon is at most 0.01 rad. It is computed from the reference, or else
   predicted from the defects.
+- The rotor angle agrees with the exact solution, if the scene has one.
 
-An engine that reports a failure makes a status worse; one that reports success never makes it
-better. Runs of the printed equations that reach the end are "completed": their accuracy is not
-judged.
+A run that passes is ok, or "unchecked" if it cannot be judged, or only in part. A failure that the
+engine reports makes the status worse; a success that it reports never makes the status better. Runs
+of the printed equations that reach the end are "completed": their accuracy is not judged.
 """
 
 from __future__ import annotations
@@ -56,8 +58,8 @@ _CHECKS = ("energy_drift_max", "defect_max", "angle_error_max")
 _RESEMBLES = 1e-2
 _RESEMBLING_ANGLE = 1.0
 
-# An initial state is certainly not singular if its share of the rotor's inertia is larger than this
-# number, see `smallest_rotor_inertia_share`.
+# The mass matrix of an initial state is certainly not singular if the share of the rotor's inertia
+# is larger than this number. `smallest_rotor_inertia_share` defines the share.
 _CLEAR_SHARE = 1e-6
 
 

@@ -37,16 +37,17 @@ from rotor_mbs.solution.trajectory import Trajectory
 
 # The share of the rotor's inertia is its inertia with all pitches free to move, divided by that
 # with fixed pitches, see `models.lagrange.singularity`. A share below NO_INERTIA counts as zero,
-# because the last bit of a pitch decides its value: a double is within 1e-16 of π/2, and the limit
-# is a hundred times the square of this distance.
+# because so small a share depends on the last bit of a pitch. At a singularity the share is about
+# the square of the distance of a pitch from π/2. The double nearest to π/2 is within 1e-16 of it.
+# NO_INERTIA is a hundred times the square of 1e-16.
 NO_INERTIA = 1e-30
 # If the share is below this limit where a run broke off, the singularity is the reason.
 SINGULAR_SHARE = 1e-3
 # Relative round-off of a run's state after some hundred steps. Near a singularity it is magnified
 # and adds to the energy error.
 _ROUND_OFF = 1e-14
-# Ten units in the last place, relative. An error of this size, in an angle that starts turns away
-# from zero, is not an error of the method.
+# Relative round-off (ten units in the last place) of an initial angle of more than one turn. An
+# angle error of this size is not an error of the method.
 _START_ROUND_OFF = 10.0 * float(np.finfo(float).eps)
 # About the number of intervals of a run. An angle error that is more than this many times the
 # largest defect cannot be the mere sum of the defects: the motion has amplified them.
@@ -323,9 +324,10 @@ def _checks_of_motion(run: RunSamples, bounds: Bounds) -> Iterator[Check]:
 
 
 def _checks_of_defects(run: RunSamples, bounds: Bounds) -> Iterator[Check]:
-    """Yield the checks of the median of the defects, and of the defect furthest beyond its bound.
+    """Yield a check of the median of the defects, and a check of the defect in the worst interval.
 
-    The second check is made with a bound of at most 0.01 rad.
+    The median is checked only if it has a bound. The bound of the second check is at most 0.01 rad.
+    The worst interval is that of `solution.metrics.worst_interval`.
 
     Parameters
     ----------
@@ -459,7 +461,7 @@ def quantity_bound(rule: QuantityMetric, bounds: Bounds, method: str) -> float |
 def quantity_errors(
     scene: Scene, metrics: Metrics
 ) -> Iterator[tuple[Quantity, QuantityMetric, float]]:
-    """Yield each judged quantity, its rule, and its error relative to the scale of the rule.
+    """Yield each judged quantity, its rule, and its metric divided by `relative_to` of the rule.
 
     Parameters
     ----------
@@ -536,15 +538,20 @@ def start_slack(scene: Scene) -> float:
 
 
 def energy_slack(scene: Scene, run: Trajectory) -> float:
-    """Return the share of the energy scale that magnified round-off may add to the energy drift."""
+    """Return the largest energy drift that round-off can cause, as a share of the energy scale.
+
+    It has two causes: round-off of the state, magnified near a singularity, and rounding of large
+    initial angles.
+    """
     return _ROUND_OFF * (energy_conditioning(scene, run) - 1.0) + start_slack(scene)
 
 
 def energy_conditioning(scene: Scene, run: Trajectory) -> float:
     """Return the factor, at least 1, by which the energy magnifies round-off of the state.
 
-    Where all pitches are near ±π/2, the terms of the kinetic energy are larger than their sum by a
-    factor of about 1/√share, with the share of the rotor's inertia that remains.
+    Where all pitches are near ±π/2, the terms of the kinetic energy are larger than their sum, by a
+    factor that is proportional to 1/√share. The share is the smallest share of the rotor's inertia
+    along the run. The factor is taken as 1 for a share of SINGULAR_SHARE or more.
     """
     smallest = max(float(least_inertia_shares(scene, run.angles).min()), NO_INERTIA)
     return max(1.0, float(np.sqrt(SINGULAR_SHARE / smallest)))

@@ -100,7 +100,7 @@ def method_table(runs: Iterable[StoredRun]) -> TextTable:
 
 
 def bench_table(curves: Sequence[Record]) -> TextTable:
-    """Return a table with a row for each curve: settings that are ok, smallest error, run times.
+    """Return a table with a row per curve: number of ok settings, smallest error, run times.
 
     The run times are those to reach the errors TARGETS_RAD. If a curve does not reach an error, the
     cell is empty. The cell is "not measured" if the time budget of the bench left out finer

@@ -1,4 +1,4 @@
-"""Hold runs in Python: `Run` for one run, `Results` for those of methods, a sweep or a file."""
+"""Hold runs in Python: a `Run` is one run, `Results` are those of a call, a sweep or a file."""
 
 from __future__ import annotations
 

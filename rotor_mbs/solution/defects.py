@@ -217,7 +217,7 @@ class Defects:
 
     @property
     def is_resolved(self) -> NDArray[np.bool_]:
-        """Return for each interval whether rounding can cause at most 0.01 rad, (n - 1,).
+        """Return for each interval whether rounding can cause at most a 0.01 rad defect, (n - 1,).
 
         An interval whose defect is not finite counts as resolved, because its fault is certain.
         """
@@ -225,9 +225,9 @@ class Defects:
 
     @property
     def is_judged(self) -> NDArray[np.bool_]:
-        """Return for each interval whether a defect of more than 0.01 rad is excluded, (n - 1,).
+        """Return for each interval whether it is resolved and its excess <= 0.01 rad, (n - 1,).
 
-        It is excluded if the interval is resolved and its excess is at most 0.01 rad.
+        In such an interval a fault of more than 0.01 rad would be seen.
         """
         return np.asarray(self.is_resolved & (self.excess <= OK_ERROR))
 
@@ -342,9 +342,11 @@ class Defects:
         return len(self.time)
 
     def _growth_matrices(self) -> Iterator[tuple[slice, Array]]:
-        """Yield slices of intervals, and transition matrices from the run's start to their ends.
+        """Yield slices of the intervals, with the transition matrices from the start of the run.
 
-        The matrices are in `growth_units`. Pitches that rest at zero are left out.
+        There is a matrix for each interval of the slice: it leads from the start of the run to the
+        end of the interval. The matrices are in `growth_units`. Pitches that rest at zero are left
+        out.
         """
         half = len(self.moving)
         free = [i for i, coordinate in enumerate(self.moving) if coordinate not in self.resting]
@@ -496,8 +498,8 @@ def _largest_entry(matrices: Array, units: Array) -> Array:
 def _with_small_numbers(floors: Array) -> Array:
     """Return floors, increased by the second-order effect of the other variables' rounding errors.
 
-    A variable that is nearly zero has nearly no rounding error of its own, so that this effect may
-    be its largest. The result is at least 1e-18 rad; NaN becomes infinite.
+    The rounding error of a variable that is nearly zero is nearly zero, too. Then this effect may
+    be larger than that error. The result is at least 1e-18 rad; NaN becomes infinite.
 
     Parameters
     ----------

@@ -30,8 +30,9 @@ class QuantityMetric:
     """Declare a metric that is computed from a quantity, and the largest value that passes.
 
     The metric is stored with the run. It is the largest magnitude of the quantity, or of its
-    difference from another array, over all samples. If the last dimension is `axis`, the magnitude
-    is the length of a vector.
+    difference from another array. All samples count, but only those up to the horizon if the other
+    array is that of the reference. If the last dimension is `axis`, the magnitude is the length of
+    a vector.
 
     Attributes
     ----------
@@ -44,8 +45,8 @@ class QuantityMetric:
     scale_of : (scene, samples) -> number by which the metric is divided before it is stored; None
         for 1.
     check : name of the check whose bound in reference/accuracy.toml applies; "" if `bound` does.
-    bound : largest value that passes if no bound of a check applies; None if the metric is then not
-        checked.
+    bound : largest value that passes. It is used if `check` is "", or if the method has no bound
+        for `check`. None if the metric is not checked in these cases.
     channel, unit : name and unit of the value in the message of a check.
     fault : message for a value that does not pass, with the field {value}.
     look_at : probable cause of a failure.
@@ -95,7 +96,8 @@ class Quantity:
         quantity itself.
     required : whether every run of a built-in method must have the quantity if its scene requests
         it.
-    judgement : how the quantity is checked; None if it is not checked, or by code of its own.
+    judgement : metric and bound of the quantity; None if the quantity is not checked, or if special
+        code in `analysis` checks it.
     plot : how the quantity is plotted; None if it has no plot of its own.
     has_peak : whether the largest magnitude and the time at which it occurs are metrics of a run.
 
@@ -201,7 +203,7 @@ def energy_error(samples: Trajectory) -> Array | None:
 def longest_arm(scene: Scene) -> float:
     """Return the largest distance (m) of a blade's centre of mass from the hub's centre.
 
-    The result is 1 if all centres of mass are at the hub's centre, so that it can be divided by.
+    The result is 1 if all centres of mass are at the hub's centre, because callers divide by it.
     """
     return max(math.hypot(*blade.centre_of_mass) for blade in scene.blades) or 1.0
 

@@ -56,10 +56,11 @@ class Comparison(NamedTuple):
 
     Attributes
     ----------
-    defect : rad, defect beyond rounding in the interval that is furthest beyond its bound; the
-        largest defect if no defect is beyond rounding.
-    allowed : rad, largest defect beyond rounding that is allowed in this interval; "rounding" if no
-        defect is beyond rounding.
+    defect : rad, defect beyond rounding in the worst interval: the interval whose defect beyond
+        rounding is the largest multiple, or share, of what is allowed. If no defect is beyond
+        rounding, this is the largest defect.
+    allowed : rad, largest defect beyond rounding that is allowed in the worst interval; "rounding"
+        if no defect is beyond rounding.
     error : rad, largest angle error up to the horizon. Without a reference it is predicted from
         the defects, and "predicted" follows the number.
     compared : the horizon and the duration of the scene, such as "6.15 of 10 s".

@@ -35,11 +35,12 @@ from rotor_mbs.solution.status import OK_ERROR, comparison
 
 
 class Trajectory:
-    """Hold the n samples of a run at equally spaced times, up to its end.
+    """Hold the n samples of a run, up to its end.
 
-    Samples are finite, but angles and rates that a file does not have are NaN. Other quantities are
-    in `quantities` by name. A built-in quantity is also an attribute, which is None if the scene
-    does not request the quantity or the model does not compute it.
+    The samples that a model returns are finite. In a run that is read from a file, angles and rates
+    that are not stored are NaN. The quantity `defect` is NaN at the first sample. Quantities other
+    than angles and rates are in `quantities` by name. A built-in quantity is also an attribute,
+    which is None if the scene does not request the quantity or the model does not compute it.
 
     Parameters
     ----------
@@ -58,7 +59,8 @@ class Trajectory:
         self.quantities = {
             name: values for name, values in quantities.items() if values is not None
         }
-        # Angles and rates at the integrator's own output points; None if it has no such points.
+        # Angles and rates at the output points of ode45, which are not the sample times. Only the
+        # method printed/ode45 sets this attribute.
         self.refined: Trajectory | None = None
 
     def get(self, name: str) -> Array | None:
@@ -253,7 +255,7 @@ def scene_at(scene: Scene, angles: Sequence[float] | Array, speed: float, torque
 
     Parameters
     ----------
-    scene : the scene to be changed; only the angles are kept of its outputs.
+    scene : scene of which a changed copy is returned. The only output of the copy is the angles.
     angles : (1 + blades,) rad, rotor first.
     speed : rotor rate, rad/s; the pitch rates are zero.
     torque : torque on the rotor, N m.
@@ -273,9 +275,9 @@ def limit_at_zero(quotients: Sequence[Array], ratio: float) -> Array:
     Parameters
     ----------
     quotients : difference quotients, the one with the smallest step first.
-    ratio : factor by which the first term of the error grows if the step is doubled, and by which
-        each further term grows more than the term before it: 2 for one-sided quotients, 4 for
-        central ones.
+    ratio : factor by which the first term of the error grows if the step is doubled: 2 for
+        one-sided quotients, 4 for central ones. The second term grows by ratio², the third by
+        ratio³, and so on.
     """
     values = list(quotients)
     # Each pass combines neighbours so that the leading term of their errors cancels. One value less
@@ -398,7 +400,7 @@ class Solution:
         return xarray.Dataset(variables, coordinates, {**facts, **self.metrics})
 
     def _summary(self) -> dict[str, str]:
-        """Return the texts that a run prints, by name: method, status and largest values."""
+        """Return the lines of the summary of a run, as texts by name; empty texts are left out."""
         last = float(self.time[-1]) if len(self.time) else self.integration.time_reached
         reached = f"{last:g} s of {self.scene.duration:g} s, {len(self.time)} samples"
         shown = comparison(self.metrics, self.scene.duration)
