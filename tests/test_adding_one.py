@@ -119,7 +119,7 @@ ADDED: dict[str, Sequence[Edit]] = {
             "    ),\n",
             '    Quantity("kinetic_energy"',
         ),
-        Edit("scenario/scene.py", '"speed", ', '"loads")  # built in'),
+        Edit("scenario/scene.py", '"speed", ', '"loads")'),
         Edit(
             "models/lagrange/samples.py",
             '    if scene.wants("speed"):\n'
@@ -136,7 +136,7 @@ ADDED: dict[str, Sequence[Edit]] = {
         Edit(
             "solution/metrics.py",
             '    metrics["rotor_rate_end"] = float(run.rates[-1, 0])\n',
-            "    # of each quantity: its largest size",
+            "    peaks: Metrics = {}",
         ),
     ],
     "a page": [
