@@ -54,8 +54,9 @@ LOAD_NAMES = tuple(load.name.replace("_", " ") for load in LOADS)
 # A scene has loads in the frame "blade" or "base". For each of these two frames, the other frames
 # in which data may have the same loads.
 # The frame "blade" turns with the pitch. The frame "coned" is the frame "blade" at zero pitch. The
-# frame "rotor" turns with the rotor; its y axis is along the shaft and its z axis normal to it,
-# for a blade at the blade's azimuth. The frame "shaft" is the base frame turned by the tilt.
+# frame "rotor" turns with the rotor: its y axis is along the shaft, and its z axis is normal to the
+# shaft. For loads of a blade, this z axis is at the blade's azimuth. The frame "shaft" is the base
+# frame turned by the tilt.
 FRAMES = {"blade": ("coned", "rotor", "shaft", "base"), "base": ("shaft", "rotor")}
 LOAD_FRAMES = ("blade", *FRAMES["blade"])
 _FRAME_ENDINGS = [[frame, "frame"] for frame in LOAD_FRAMES]

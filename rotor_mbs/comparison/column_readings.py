@@ -39,7 +39,7 @@ LATE_OR_EARLY = (" late", " early")
 HELD = "every number is held"
 _MAX_ROWS_LATE = 3  # largest number of rows by which a column may be late or early
 _MEANS_OF_ROWS = range(2, 22)  # numbers of rows over which a mean may be taken
-_FINE_ROWS = 100  # number of the first intervals for which means over an interval are computed
+_FINE_ROWS = 100  # means over an interval are computed for this many intervals, from the first on
 _SAMPLES = 20  # number of parts of an interval, at whose ends the reference is computed for a mean
 _MEANS_OF_SAMPLES = (2, 4, 5, 10, 20)  # numbers of samples over which a mean may be taken
 # A mistake is accepted only if the error that it leaves is below this share of the error of the
@@ -52,7 +52,9 @@ _MAX_STEPS = 1 << 20  # largest number of steps in the range of a column with co
 _MAX_DIVISIONS = 12  # largest number of iterations of Euclid's algorithm
 _WHOLE = 1e-3  # largest deviation, in steps, from an integer number of steps
 _EQUAL_STEPS = 1e-6  # relative: time steps that differ by no more than this are taken as equal
-_MIN_SHARE = 0.01  # smallest share of the distance that a filter covers from row to row
+# Smallest share of the distance to the right number that a filter covers from row to row. The share
+# must also be smaller than 1 by more than this number.
+_MIN_SHARE = 0.01
 # Largest rounding of the corrected numbers, relative to the difference that a filter explains.
 _MAX_ROUNDING = 0.02
 # Ways of bringing numbers to coarse steps, and the largest error of each, in steps.
@@ -68,7 +70,7 @@ class Reading:
     text : the mistake in words, "" for none.
     left : the largest remaining error per unit of error growth, beyond rounding.
     corrected : (rows,) the right numbers; None if they cannot be found from the column.
-    rounding : (rows,) half a unit in the last digit of each number.
+    rounding : (rows,) largest error of each right number that rounding or coarse steps may cause.
     is_processed : whether the mistake is more than a wrong unit, sign, zero or factor.
     """
 
@@ -497,11 +499,14 @@ class ColumnReadings:
 
 
 def held_rows(values: Array) -> int:
-    """Return the number of rows after which numbers change, 0 if they never change.
+    """Return the number of rows for which every number is held, 0 if the numbers never change.
+
+    The result is the largest number of rows that divides all distances between changes; it is 1 if
+    numbers change in two successive rows.
 
     Parameters
     ----------
-    values : (n, columns) numbers.
+    values : (n, columns) numbers. They change in a row if any column differs from the row before.
     """
     changes = np.flatnonzero(np.diff(values, axis=0).any(axis=1)) + 1
     if not len(changes):

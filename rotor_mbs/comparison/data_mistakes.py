@@ -65,7 +65,9 @@ _MAX_PERIOD = 20  # largest number of rows from a computed row to the next, in i
 # A spline is tried on the first _FIRST_ROWS rows before it is tried on all rows. The allowed
 # difference is larger in these rows, by the share _NEARLY_BETWEEN of a column's largest number.
 _FIRST_ROWS, _NEARLY_BETWEEN = 401, 1e-6
-_MIN_KNOTS = 5  # smallest number of knots of a spline: a polynomial fits fewer rows, or nearly so
+# Smallest number of knots of a spline: a spline with fewer knots is hardly more than a polynomial,
+# which fits a short motion that is not interpolated, too.
+_MIN_KNOTS = 5
 # Data are called interpolated only if the reference would not pass as interpolated itself: one of
 # its rows must be off the spline by more than this many times the allowed difference.
 _NOT_BY_CHANCE = 10.0
@@ -129,7 +131,10 @@ class TrajectorySearch:
         return data.rows((data.time >= 0.0) & (data.time <= end))
 
     def carried(self, time: Array) -> Array:
-        """Return `carried_errors`, interpolated at (n,) times, (n, 2 (1 + blades))."""
+        """Return the reference's `carried_errors` at (n,) times, (n, 2 (1 + blades)).
+
+        The errors are interpolated linearly between the rows of the reference.
+        """
         run = self.exact.trajectory
         carried = carried_errors(run, self.exact.growth, self.exact.units)
         columns = [np.interp(time, run.time, column) for column in carried.T]
@@ -137,15 +142,18 @@ class TrajectorySearch:
 
     @property
     def allowed(self) -> float:
-        """Return the largest error per unit of growth, and defect (rad), that may be left."""
+        """Return the largest error per unit of error growth that a mistake may leave.
+
+        The same number, in rad, is the largest defect that may be left.
+        """
         return max(self.tolerance, min(_LEFT * self.worst, _MAX_LEFT))
 
     def defect_left(self, correction: Correction) -> float:
         """Return the largest defect of corrected data beyond rounding, rad.
 
         Sums of defects over longer stretches count as defects, too. The result is 0 if no defects
-        can be computed, for example because no column can be corrected. Such columns have been
-        compared with the reference before.
+        can be computed, for example because no column can be corrected. The comparison of the
+        columns with the reference, which comes before, is then the only test.
 
         Parameters
         ----------
@@ -500,7 +508,8 @@ def _may_explain(search: TrajectorySearch, inside: ForeignData, *, with_factor: 
         states, carried = search.states_at(window.time), search.carried(window.time)
         readings = _readings(wider, window, states, carried, with_factor=with_factor)
         places = range(len(window.channels))
-        # A window may show too little of a column that is held or limited.
+        # A column whose numbers do not change in every row is not tested: if the column is held or
+        # limited, the window may be too short to show this mistake.
         if all(held_rows(window.values[:, [j]]) != 1 or readings.best(j) for j in places):
             continue
         largest = min(
@@ -558,8 +567,9 @@ def _nearest_channels(
     places = range(len(errors))
     preference[places, inside.columns] = -1e-3  # if errors are equal, a column keeps its channel
     sizes = np.log10(np.clip(errors, 1e-16, 1e16)) + preference
-    # If columns are exchanged, no two of them have the same channel. If a column is written in
-    # place of another one, two have the same channel. The better of both assignments is taken.
+    # If columns are exchanged, no two columns have the same channel. If a column is written in
+    # place of another one, two columns have the same channel. Channels are assigned in both ways,
+    # and the assignment whose largest error is smaller is taken.
     _, exchanged = linear_sum_assignment(sizes)
     chosen = min(exchanged, sizes.argmin(axis=1), key=lambda columns: errors[places, columns].max())
     return chosen.tolist(), float(errors[places, chosen].max())

@@ -41,10 +41,12 @@ _LEFT_OF_FITTED = {1: 0.02, 2: 2e-3, 3: 2e-3}
 # defects are within rounding, the factor is _ALIKE_IN_ROUNDING.
 _ALIKE = 3.0
 _ALIKE_IN_ROUNDING = 1.05
-_QUICK = 3e-5  # relative error of the effect of another model that is computed by quick steps
-# Fine steps are up to _MOST_FINE times as many as coarse steps, so that the error _QUICK also holds
-# if the mass matrix is nearly singular. A search with a lower limit on the number of steps takes at
-# most _FINE_STEPS fine steps in an interval.
+# Relative error of a model's effect, the change of the states at the ends of intervals, if quick
+# steps compute it.
+_QUICK = 3e-5
+# Quick steps are coarse or fine. Fine steps are up to _MOST_FINE times as many as coarse steps, so
+# that the error _QUICK also holds if the mass matrix is nearly singular. If a search allows fewer
+# than _MAX_STEPS coarse steps in an interval, the interval has at most _FINE_STEPS fine steps.
 _MOST_FINE, _FINE_STEPS = 8, 32
 # A model is tried by fine steps only if it leaves at most this share of the defects by coarse ones.
 _PERHAPS = 0.2
@@ -71,7 +73,8 @@ _MAX_STEPS, QUICK_SEARCH, BRIEF_SEARCH = 512, 32, 8
 _MAX_FITTED_BRIEF = 4  # the value of _MAX_FITTED for a search in data that agree
 _DIFFERENCE = 1e-4  # change of a parameter, share or rad, for the difference quotient
 _ROUNDS = 8  # largest number of Gauss-Newton iterations
-_INDEPENDENT = 1e-6  # smallest determinant of the cosines between independent signatures
+# Signatures count as independent if the determinant of the matrix of their cosines is larger.
+_INDEPENDENT = 1e-6
 _MAX_NAMED = 6  # largest number of explanations that a search returns
 
 
@@ -342,8 +345,9 @@ class DefectSearch:
             amounts = np.linalg.solve(matrices, sides[..., None])[..., 0]
             # Each set explains the part `squares` of `total`.
             squares = (sides * amounts).sum(axis=1)
-            # Signatures hold for small changes only. A single parameter may be far off, with
-            # another signature there: it is fitted even if its signature here explains little.
+            # Signatures hold for small changes only. A single parameter may be so far off that its
+            # signature changes. It is therefore fitted even if its signature at the scene's value
+            # explains little.
             if count > 1:
                 is_enough = squares > (1.0 - _LEFT_OF_SETS**2) * total
                 sets, squares = sets[is_enough], squares[is_enough]
@@ -353,7 +357,8 @@ class DefectSearch:
                 if hypothesis is not None:
                     fitted.append(hypothesis)
             # Fitted parameters explain a part of any defects, and several parameters a large part.
-            # They may therefore leave less than a textbook mistake, whose size is not fitted.
+            # The limit on what they leave is therefore smaller than that of a textbook mistake,
+            # whose size is not fitted.
             allowed = min(self._allowed, _LEFT_OF_FITTED[count] * self._largest)
             left = functools.partial(self._left_at_most, allowed=allowed)
             explained = list(explanations(fitted, left))
@@ -368,7 +373,7 @@ class DefectSearch:
 
     def _signatures(self) -> tuple[list[Parameter], Array]:
         """Return the parameters that have an effect, and their signatures as unit vectors."""
-        # Scalar products of unit vectors are the cosines between signatures.
+        # Signatures have unit length, so that their scalar products are the cosines between them.
         candidates, signatures = [], []
         for parameter in parameters(self._scene):
             slope = self._slope([parameter], [0.0], 0).ravel()
@@ -529,9 +534,9 @@ def _window_residuals(
 ) -> tuple[Array, Array, Array]:
     """Compute the residuals of the angles in each window after a fit of the scene's motion.
 
-    The residuals take the place of defects in data whose rates are fitted to the angles. With
-    fitted rates the closed form fits the data best, so that the defects of single intervals show
-    only a part of a mistake.
+    The residuals take the place of defects in data whose rates are fitted to the angles. The fit
+    chooses rates with which the closed form of the scene is nearest to the angles. The defects of
+    single intervals then show only a part of a mistake.
 
     Parameters
     ----------

@@ -1,9 +1,9 @@
 """Read a file of any format, in the worker process that `comparison.files` starts.
 
-Libraries read the numbers: pandas those of text and of tables in JSON, NumPy .npz, pymatreader and
-SciPy MAT files, SciPy netCDF-3, h5py HDF5 and netCDF-4, openfast_io .outb. xarray unpacks arrays of
-netCDF and HDF5 by the CF conventions. The headers of text files, including those of OpenFAST and
-Exudyn, are read by the code below.
+Libraries read the numbers. pandas reads text and tables in JSON; NumPy reads .npz; pymatreader and
+SciPy read MAT files; SciPy reads netCDF-3; h5py reads HDF5 and netCDF-4; openfast_io reads .outb.
+xarray unpacks arrays of netCDF and HDF5 by the CF conventions. The headers of text files, including
+those of OpenFAST and Exudyn, are read by the code below.
 
 A file may be damaged or malicious. The size of the arrays that a file claims to have is therefore
 checked before they are read. The process has limits of memory and time for all other cases. The
@@ -87,7 +87,9 @@ _FORTRAN = re.compile(r"(?<=[\d.])[dD](?=[+-]?\d)")  # 1.5D-03
 _FORTRAN_3_DIGITS = re.compile(r"(?<=[\d.])(?=[+-]\d{3}$)")
 # Texts that programs write in place of a missing number. The first row of numbers may have them.
 _MISSING = re.compile(r"\*+|-+|\?|#?n/?a!?|null|none|missing|nil", re.IGNORECASE)
-_MAX_SEARCHED = 200  # largest number of lines searched for a header above texts or vectors
+# Number of lines, from the first on, that are searched for the header of a table in which columns
+# are texts or vectors.
+_MAX_SEARCHED = 200
 
 Arrays = Mapping[str, Any]
 Units = Mapping[str, str]
@@ -421,7 +423,7 @@ def _netcdf_3(path: Path) -> tuple[Arrays, Mapping[str, Mapping[str, Any]]]:
             for key in ARRAY_ATTRIBUTES:
                 if hasattr(variable, key):
                     attributes[name][key] = getattr(variable, key)
-            # The netCDF library stores this number in rows that no program has written.
+            # The netCDF library stores the number `fill` in rows that no program has written.
             fill = _DEFAULT_FILL.get(arrays[name].dtype.str[1:])
             if fill is not None:
                 attributes[name].setdefault("_FillValue", fill)
@@ -456,8 +458,8 @@ def _hdf5(path: Path, group: str, scene: str) -> DataTable:
         allowed = "a table that other programs can read: to_csv, or to_xarray().to_netcdf"
         raise InputError(f"{path}: pandas' own layout of HDF5 (to_hdf); allowed: {allowed}")
     for name, values in arrays.items():
-        # In floating-point rows that no program has written, the netCDF library stores this number.
-        # The HDF5 library stores 0.
+        # If no program has written a row of an array of floating-point numbers, the netCDF library
+        # stores the number `fill` in the row, and the HDF5 library stores 0.
         fill = _DEFAULT_FILL.get(values.dtype.str[1:]) if values.dtype.kind == "f" else None
         if fill is not None:
             attributes[name].setdefault("_FillValue", fill)
@@ -829,9 +831,10 @@ def _first_row(source: str, lines: Lines) -> tuple[int, str | None]:
     Raises
     ------
     InputError
-        If there is no row of numbers. The message then names the line with the most numbers.
+        If there is no row of numbers, or all numbers are in a single column.
     """
-    # The message names the line with the most numbers among the lines that also have other texts.
+    # If there is no row of numbers, the message names the line that has the most numbers among the
+    # lines with numbers and other texts.
     most_numbers, nearest = 0, ""
     for place, (number, line) in enumerate(lines):
         if line.startswith(_COMMENT):
@@ -864,8 +867,8 @@ def _first_row(source: str, lines: Lines) -> tuple[int, str | None]:
 def _first_row_with_texts(lines: Lines) -> tuple[int, str | None] | None:
     """Find the first row of a table in which some columns are texts.
 
-    Such a table is recognized by a line without numbers, the header, and two lines below it that
-    have numbers. All three lines have the same number of fields.
+    Such a table is recognized by three successive lines with the same number of fields. The first
+    line has no numbers: it is the header. The two lines below it have numbers.
 
     Parameters
     ----------
@@ -992,8 +995,8 @@ def _columns_of_rows(
     except pd.errors.ParserError:
         _refuse_ragged(source, rows, divider, width)
         raise
-    # pandas adds empty fields to rows that are too short. The fields are counted then, because a
-    # complete row may also end with an empty field.
+    # pandas adds empty fields to rows that are too short. If the last column has an empty field,
+    # the fields of every row are counted, because a complete row may end with an empty field, too.
     if len(frame) != len(rows) or frame[width - 1].isna().any():
         _refuse_ragged(source, rows, divider, width)
     columns: list[NDArray[np.float64] | LeftOut] = []
@@ -1114,8 +1117,9 @@ def _words(line: str, divider: str | None, width: int) -> list[str]:
     Parameters
     ----------
     line : the line.
-    divider : separator of the numbers, None for blanks. If it does not give the right number of
-        names, other separators are tried.
+    divider : separator of the numbers, None for blanks. Other separators are tried if this one does
+        not give the right number of names. If it is None, wide blanks and units are always tried
+        first, because a name may contain a blank.
     width : number of columns.
     """
     words = _fields(line, divider)
