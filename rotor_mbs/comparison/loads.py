@@ -36,8 +36,10 @@ _LOAD_ROUNDING = 16.0 * 2.0**-53
 _STATE_STEP = 1e-7  # relative step of an angle or rate, for the derivative of the loads
 _FEW_ROWS = 50  # largest number of rows in which another scene is tried first, to save time
 MIN_EXPLAINED = 5  # least number of rows for a search; with fewer, some cause always fits
-# A mistake is named as a cause if it leaves at most MAX_LEFT of the largest load (modes: of a
-# frequency) and at most LEFT_SHARE of the difference. The rest is the other program's own error.
+# A mistake is named as a cause if the errors that it leaves are at most LEFT_SHARE of the
+# difference, and at most MAX_LEFT, or the tolerance if it is smaller, relative to the largest value
+# of the load component or, in `comparison.modes`, to the frequency. What is left counts as the
+# other program's own error.
 MAX_LEFT = 1e-4
 LEFT_SHARE = 1e-2
 WHOLE = LoadParts()
@@ -185,7 +187,7 @@ def loads_by_frame(
     -------
     dict of ndarray
         For each frame the loads, (n, components) N or N m in the order of `channels`. A load that
-        has no components in this frame has those in its own frame.
+        cannot be given in this frame has the components of its own frame.
     """
     loads = sampled_loads(scene, time, angles, rates, parts)
     by_frame = {frame: dict(loads) for frame in _FRAMES}
@@ -225,13 +227,16 @@ def shaft_direction(scene: Scene, frame: str) -> Array:
 
 
 def _plain_frame(scene: Scene, frame: str, of_shaft: bool = False) -> str:
-    """Return a frame, or another frame that is the same if the scene has no tilt or no cone.
+    """Return the name under which a frame is used, if two frames of the scene are equal.
+
+    Without cones the coned frame is used as the rotor's frame. Without tilt the shaft's frame is
+    used as the base. Every other frame keeps its name.
 
     Parameters
     ----------
     scene : the rotor, with tilt and cones.
     frame : one of `_FRAMES`.
-    of_shaft : whether a load on the shaft is given in this frame; its own frame is the base.
+    of_shaft : whether the load is a load on the shaft. Its own frame, "", is then the base.
     """
     if frame == "coned" and not any(blade.cone for blade in scene.blades):
         return "rotor"
@@ -313,8 +318,9 @@ def _loads_in_rows(
         if channel.kind == "moment":
             arms[j] = longest_arm(scene)
     rounding = loads.rounding[: len(time)] + _LOAD_ROUNDING * largest_force[:, None] * arms
-    # The states are rounded, too. The derivative of the loads by each angle and rate, a forward
-    # difference, times the rounding of this number is an uncertainty of the loads.
+    # The states are rounded, too. The rounding of each angle and rate causes an uncertainty of the
+    # loads: it is multiplied by the derivative of the loads by this variable, which is computed as
+    # a forward difference.
     for i in range(2 * half):
         step = _STATE_STEP * np.maximum(np.abs(states[:, i]), 1.0)
         moved = states.copy()
@@ -438,8 +444,8 @@ def _explained(loads: JudgedLoads, wrong: Sequence[int]) -> tuple[str, ...]:
     Returns
     -------
     tuple of str
-        A single cause, another scene, if it explains all wrong channels; else causes, each with the
-        names of the channels that it explains. Empty if nothing fits.
+        If another scene explains all wrong channels, this scene is the only cause. Otherwise
+        several causes, each with the names of the channels that it explains. Empty if nothing fits.
     """
     wrong = list(wrong)
     of_scene = _other_scene(loads, wrong)
@@ -571,7 +577,8 @@ def _other_hub_mass(loads: JudgedLoads, wrong: Sequence[int]) -> dict[int, str]:
     difference = (loads.values - loads.expected)[:, forces]
     change = float((per_kg * difference).sum() / ((per_kg**2).sum() or 1.0))
     mass = scene.hub_mass + change
-    # A hub without mass has a text of its own, see `_component_hypotheses`: without its weight.
+    # A fitted mass of about zero is not named here: `_component_hypotheses` has the text "without
+    # the hub's weight" for it.
     if mass <= MAX_LEFT * abs(change):
         return {}
     right = _loads_of(loads, replace(scene, hub_mass=mass))
@@ -664,7 +671,16 @@ def _shared_texts(
 
 
 def _shared_names(loads: JudgedLoads, names: Sequence[str]) -> list[str]:
-    """Return names of channels; one name of a load replaces the names of all its components."""
+    """Return names of channels, with the components of a load at all blades under one name.
+
+    The name of a load, without the number of a blade, replaces the names of its components if the
+    components at all blades are among `names`.
+
+    Parameters
+    ----------
+    loads : the rows that are judged.
+    names : names of channels.
+    """
     by_load: dict[str, list[str]] = {}
     for channel in loads.channels:
         by_load.setdefault(_load(channel).rstrip("0123456789 "), []).append(channel.name)

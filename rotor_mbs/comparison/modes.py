@@ -31,7 +31,9 @@ from rotor_mbs.studies.modes import compute_modes
 # it, not by the frequencies themselves.
 _SLOW = 1e-3
 _MAX_SPEEDS = 1000
-_MIN_TURNING = 3  # smallest number of speeds above 0 for a fit: a parabola fits any two of them
+# Smallest number of speeds above 0 for a fit of α, see `_without_stiffening`. An exact fit
+# at a single speed would mean nothing, because α is free.
+_MIN_TURNING = 3
 _HZ, _RPM = 2.0 * math.pi, math.pi / 30.0  # one Hz and one rpm in rad/s
 _UNITS = {
     1.0: "",
@@ -46,8 +48,8 @@ def compare_modes(data: ForeignData, scene: Scene, tolerance: float) -> tuple[Da
     """Compare columns of frequencies with the modes of a scene.
 
     The modes are those of steady rotation without gravity, or those at rest under gravity if no
-    speed is above 0. At each speed, every column is assigned one mode, and no mode to two columns,
-    with the least sum of the differences.
+    speed is above 0. At each speed, every column is assigned a different mode. Of all assignments,
+    the one with the least sum of the differences is chosen.
 
     Parameters
     ----------

@@ -29,8 +29,8 @@ from rotor_mbs.solution.trajectory import Array
 _GRAVITIES = (9.8, 9.80665, 9.81, 9.82, 10.0, 32.174, 0.0)  # m/s²; 32.174 is in ft/s²
 # Azimuths and pitch angles at which other programs often place the zero: rad, by degrees.
 _QUARTERS = {90: math.pi / 2.0, 180: math.pi, 270: -math.pi / 2.0}
-# For each zero of the azimuth, the direction of gravity in the base with the same effect on the
-# motion.
+# Directions of gravity in the base. Each has the same effect on the motion as a zero of the azimuth
+# that is moved by the degrees of its key.
 _GRAVITY_AT_QUARTER = {90: "+x", 180: "+z", 270: "-x"}
 _MAX_BLADES = 6  # largest number of blades for which the blades are also tried one by one
 # Fields of a scene with an entry per blade, and their keys in a scene file.
@@ -91,8 +91,8 @@ _LOADS = {
 _CYCLES = (2, 5, 10, 20, 50)  # numbers of rows over which a controller may hold its loads
 # Numbers of rows by which loads may be late.
 _DELAYS = (1, 2, 3, 4, 5, 8, 10, 15, 20, 25, 30, 40, 50, 75, 100)
-# Sets of the paper's errata with different effects. E3 is tried only together with E2: the term
-# whose power it changes is zero without E2.
+# Sets of the paper's errata that are tried. E3 is tried only together with E2: if E2 is corrected,
+# the term whose power E3 changes is zero.
 _ERRATA = ("E1", "E2", "E1 and E2", "E2 and E3", "E1 and E2 and E3")
 
 # The way from a scene to one of its numbers: names of fields and indices of entries.
@@ -108,8 +108,8 @@ class RotorModel:
     scene : the rotor.
     azimuths : (blades,) rad, azimuths of the blades; None for `Scene.phases`.
     equations : function for the accelerations; None for the closed form's.
-    method, steps : step of an integration method with an error of its own, None for an exact
-        integration; number of its steps from row to row.
+    method : function for one step of a coarse integration method; None for an exact integration.
+    steps : number of steps of `method` from row to row.
     """
 
     scene: Scene
@@ -156,9 +156,10 @@ def rotor_hypotheses(scene: Scene) -> Iterator[Hypothesis[RotorModel]]:
         if other != scene:
             yield Hypothesis(text, RotorModel(other))
     for sense, sign in (("-", 1.0), ("+", -1.0)):
-        # The motion depends only on the direction of gravity in the shaft's axes, which a tilt
-        # turns. A tilt also turns tips and loads, so this is not one of `other_scenes`, which are
-        # used for tips and loads, too.
+        # Another direction of gravity is expressed by a tilt of the shaft, because the motion
+        # depends only on the direction of gravity relative to the shaft. A tilt also turns tips and
+        # loads. `other_scenes`, which are used for tips and loads, too, therefore do not include
+        # these tilted scenes.
         tilted = replace(scene, shaft_tilt=scene.shaft_tilt + sign * math.pi / 2.0)
         yield Hypothesis(f"gravity along {sense}y of the base", RotorModel(tilted))
     for text, azimuths in other_azimuths(scene):
@@ -375,7 +376,7 @@ class _MassMatrix:
             self.couplings.append(coupling)
 
     def times(self, accelerations: Sequence[Any]) -> list[Any]:
-        """Return the matrix times accelerations, rad/s², which are moments, N m."""
+        """Return the moments, N m, that are the product of the matrix and accelerations, rad/s²."""
         rotor, *pitches = accelerations
         moments = [self.inertia * rotor]
         for inertia, coupling, pitch in zip(self._pitches, self.couplings, pitches, strict=True):
@@ -525,7 +526,8 @@ def other_scenes(scene: Scene) -> Iterator[tuple[str, Scene]]:
         hubs = replace(scene, hub_inertia=count * scene.hub_inertia)
         yield "the hub's inertia once for each blade", hubs
     if not scene.has_constant_loads:
-        # A program that reads the loads once per segment reads all loads at the kinks of each load.
+        # A program that reads the loads once per segment holds all loads from a kink of any load to
+        # the next kink of any load.
         times = [0.0, *scene.kink_times, scene.duration]
         yield "ramps of loads held at their value at the start", with_held_loads(scene, times)
     for degrees, angle in _QUARTERS.items():
@@ -542,16 +544,16 @@ def by_rows(
     ----------
     scene : the rotor as it is.
     times : (n,) s, times of all rows.
-    intervals : (k,) numbers of the intervals on which hypotheses are tried. Loads are held in these
-        intervals; elsewhere they need not be.
+    intervals : (k,) numbers of the intervals on which hypotheses are tried. The held loads are
+        right in these intervals only; in others they may be held for too long.
     """
     step = float(times[-1] - times[0]) / (len(times) - 1)
     for text, method, steps in coarse_methods(step):
         yield Hypothesis(text, RotorModel(scene, method=method, steps=steps))
     if scene.has_constant_loads:
         return
-    # The first hypothesis, which changes all loads, is skipped: held ramps of all loads are among
-    # `other_scenes`.
+    # The first hypothesis, in which all changing loads are held, is skipped. `other_scenes` have a
+    # scene in which all loads are held, though from each kink of any load to the next.
     held = _with_tables(scene, _held_from_row_to_row)
     how = "held from row to row of their tables"
     yield from itertools.islice(_with_loads_of(scene, held, how), 1, None)
@@ -668,7 +670,7 @@ def _single_blades(scene: Scene) -> range:
 
 
 def _other_blades(scene: Scene) -> Iterator[tuple[str, Scene]]:
-    """Yield mistakes in the numbers of blades, in words, each with the scene that has it.
+    """Yield mistakes in the properties of blades, in words, each with the scene that has it.
 
     Parameters
     ----------
@@ -775,8 +777,8 @@ _INERTIAS: Mapping[str, Callable[[Array, Array], Array]] = {
     "products of inertia about the centre of mass ignored": lambda own, _: own * (1.0 - _PRODUCTS),
     "blades without inertia, as point masses": lambda own, _: 0.0 * own,
     "products of inertia with opposite sign": lambda own, _: own * (1.0 - 2.0 * _PRODUCTS),
-    # The share is added when the tensor is moved to the apex. The sum of products, own + share,
-    # then has the opposite sign if twice the sum is subtracted before.
+    # The products of inertia about the apex are own + share, because the model adds the share. They
+    # get the opposite sign if twice own + share is subtracted from own.
     "products of inertia about the root with opposite sign": lambda own, share: (
         own - 2.0 * _PRODUCTS * (own + share)
     ),
@@ -883,7 +885,7 @@ def parameters(scene: Scene) -> Iterator[Parameter]:
 
 
 def _blade_parameters(scene: Scene, chosen: list[int], number: str) -> Iterator[Parameter]:
-    """Yield the parameters of some blades, which are changed together.
+    """Yield the parameters of some blades; each parameter changes all these blades together.
 
     Parameters
     ----------

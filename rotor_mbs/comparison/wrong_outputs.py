@@ -1,8 +1,10 @@
 """Find the mistakes with which a method computes wrong rows, tips, energies or loads.
 
-Each output is compared with the results of common mistakes at the same states. A mistake is named
-if it leaves at most a thousandth of the difference; a mistake in tips only if no other mistake
-does. For mistakes in loads the rules of `comparison.loads` hold.
+Tips, energies and loads are compared with the results of common mistakes at the same states. Rows
+are corrected for a mistake, and their defects are computed again. A mistake is named if it leaves
+at most a thousandth of the difference or of the defects. A mistake in tips is named only if no
+other mistake does so, too, and mistakes in an energy only if there are at most three. For mistakes
+in loads the rules of `comparison.loads` hold.
 """
 
 from __future__ import annotations
@@ -27,7 +29,8 @@ from rotor_mbs.solution.trajectory import Array, Trajectory
 
 _LEFT = 1e-3  # largest share of a difference that a named mistake may leave
 _STRAIGHT = 0.3  # share of rows on straight lines, above which rows are taken to be interpolated
-# Largest number of mistakes in an energy that are named, and of blades with a wrong tip.
+# Largest number of mistakes that may explain an energy; if there are more, none is named. Also the
+# largest number of blades whose wrong tips are named.
 _MAX_ALIKE = 3
 
 
@@ -223,7 +226,7 @@ def _other_tip_points(scene: Scene, tip: Array, angles: Array, own: Array) -> st
         offsets = np.einsum("nbij,nbi->nbj", axes, tip - own).mean(axis=0)
         if np.abs(tip - own - np.einsum("nbij,bj->nbi", axes, offsets)).max() > allowed:
             continue
-        offsets[np.abs(offsets) <= allowed] = 0.0  # rounding
+        offsets[np.abs(offsets) <= allowed] = 0.0  # as small as errors that a mistake may leave
         shown = ["(" + ", ".join(f"{x:.4g}" for x in offset) + ")" for offset in offsets]
         if len(set(shown)) == 1:
             return f"tips off by {shown[0]} m {text}"
