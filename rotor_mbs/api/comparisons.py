@@ -147,10 +147,13 @@ class DataComparison:
         """Return a pandas DataFrame with a row per channel.
 
         `error_max` and `error_whole` are the largest errors up to the horizon and over all rows, in
-        `unit`. `floor` is the estimated effect of the rounding of the data on a defect; `defect` is
-        what remains of the largest defect after three times the floor is subtracted. Both are in
-        `defect_unit`. The other columns have, for each of several levels, the time (s) up to which
-        the errors stay within the level; for modes the speed (rad/s).
+        `unit`. `defect` is the number that is compared with the tolerance. For an angle or a rate
+        it is the largest interval defect: three times the effect of rounding on each defect is
+        subtracted, and the rest is divided by a factor for long intervals and error growth. For a
+        load or a frequency it is the largest relative error, less three times the effect of
+        rounding. `floor` is the largest of these effects, as estimated. Both are in `defect_unit`.
+        The other columns have, for each of several levels, the time (s) up to which the errors stay
+        within the level; for modes the speed (rad/s).
         """
         rows = []
         for channel in self.verdict.channels:

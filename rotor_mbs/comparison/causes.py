@@ -30,10 +30,12 @@ def likely_causes(search: TrajectorySearch, judged: JudgedDefects | None) -> lis
     """Search for causes of the differences in data that do not agree.
 
     Mistakes in columns and times are tried first; then other models, other parameters and faults at
-    some times; then scatter, or a factor of a channel. If the data start in another state than the
-    scene, a mistake in one column may be why. Other models are then tried last. Only one kind of
-    them is tried earlier, before scatter: scenes of the catalogue that have the initial state of
-    the data.
+    some times; then scatter, or a factor of a channel.
+
+    The order changes if the data start in another state than the scene. The reason may be a mistake
+    in one column, such as a factor. Other models, parameters and faults are therefore tried last,
+    except for the scenes of the catalogue that have the initial state of the data. These scenes are
+    tried before scatter.
 
     Parameters
     ----------

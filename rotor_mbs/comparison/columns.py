@@ -34,8 +34,8 @@ class DataColumn(NamedTuple):
     unit : the unit that the file states; "" if it states none.
     step : step between the numbers, in the same unit, if they are packed as integers; otherwise 0.
     missing : text for messages about the first missing number, with its row: "empty in row 2 of 9
-        (line 3)"; "" if no number is missing, or if it is not known how the file writes a missing
-        number, as for arrays.
+        (line 3)". It is "" if no number is missing, and in data whose missing numbers are NaN,
+        such as arrays.
     """
 
     values: NDArray[np.float64]
@@ -296,7 +296,8 @@ def _numbers_of_objects(array: NDArray[Any]) -> NDArray[np.float64]:
     Raises
     ------
     _NotNumbersError
-        If an object is no number; the message names the row of the first such object.
+        If an object is no number. The message names the row of the first such object; if the object
+        is a list or an array, the message is that rows have different lengths.
     """
     numbers = np.empty(array.size)
     width = math.prod(array.shape[1:]) or 1
@@ -398,7 +399,7 @@ def _behind_stroke(text: str) -> tuple[int, str] | None:
     Returns
     -------
     (int, str) or None
-        The position at which it begins, and the unit; None if the name does not end so.
+        The position in `text` at which " /" begins, and the unit; None if the name has no such end.
     """
     words = text.rsplit(maxsplit=2)
     if len(words) == 3 and words[1] == "/":

@@ -28,11 +28,12 @@ from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.trajectory import Array
 
 # Numbers of significant digits. Whether numbers have a given number of digits is tested by
-# arithmetic up to _FEW_DIGITS digits, and by formatting them as text for more digits. In the test
-# by text, a relative difference of _ROUNDED_SINCE is allowed up to _SURE_DIGITS digits. For more
-# digits no difference is allowed: it would be nearly as large as the rounding itself, and numbers
-# that are not rounded would pass, too (a third of them at 15 digits, nearly all at 16). No double
-# needs more than _ALL_DIGITS.
+# arithmetic up to _FEW_DIGITS digits, and by formatting them as text for more digits. A number
+# passes the test by text if its relative difference from the number in the text is at most
+# _ROUNDED_SINCE. This holds up to _SURE_DIGITS digits. For more digits both numbers must be equal:
+# a difference of _ROUNDED_SINCE is nearly as large as the rounding itself, and numbers that are not
+# rounded would pass, too (a third of them at 15 digits, nearly all at 16). No double needs more
+# than _ALL_DIGITS.
 _FEW_DIGITS, _SURE_DIGITS, _ALL_DIGITS = 9, 14, 17
 # At most about this many numbers of a column, evenly spaced, are formatted as text: 1 us each.
 _MAX_WRITTEN = 20_000
@@ -66,8 +67,9 @@ class ForeignData:
     loads_left_out : names of the loads that are in unused columns although the mapping does not
         omit them.
     wrapped : for each channel, whether the file has the angle without its whole turns.
-    precision : precision of the numbers in words: "4 decimals: rounding error 5e-05", or the same
-        with a number of digits; "" if the numbers have hardly any rounding.
+    precision : precision of the numbers in words, as a number of decimals ("4 decimals: rounding
+        error 5e-05"), as a number of digits, or as single precision; "" if the numbers have hardly
+        any rounding.
     time_precision : precision of the times in words; "" also if nearly all intervals are equal.
     notes : what was done to the rows, a line each.
     omitted : names of the channels that the mapping omits: the data need not have them.

@@ -120,7 +120,7 @@ class JudgedDefects:
     is_judged : (n - 1,) whether an interval counts: its defects are finite, and rounding explains
         at most 0.01 rad of them.
     excess : (n - 1,) rad, largest defect of an interval beyond rounding; 0 if it does not count.
-    has_fitted_rates : whether the rates are fitted to the angles.
+    has_fitted_rates : whether all rates are fitted to the angles, because the data have no rates.
     """
 
     scene: Scene
@@ -153,15 +153,15 @@ def judged_defects(
     ----------
     scene, defects : the rotor, and the interval defects of the data.
     tolerance : rad, the largest allowed defect of an interval.
-    has_fitted_rates : whether the rates are fitted to the angles.
+    has_fitted_rates : whether all rates are fitted to the angles, because the data have no rates.
     """
     moving = list(defects.moving)
     vectors = np.hstack([defects.angles[:, moving], defects.rates[:, moving]])
     units = np.concatenate([np.ones(len(moving)), defects.rate_units[moving]])
     values = vectors / units
-    # The estimated rounding of a number near zero is much smaller than that of its neighbours. The
-    # small defects at such a number must not look large beside it: floors have a lower limit, a
-    # share of the channel's median.
+    # The estimated rounding of a number near zero is much smaller than that of its neighbours. A
+    # small defect at such a number would look large compared with this estimate. Therefore floors
+    # have a lower limit, a share of the channel's median.
     floors = np.maximum(defects.floors, 0.3 * np.median(defects.floors, axis=0) + 1e-18)
     is_judged = defects.is_resolved & np.isfinite(vectors).all(axis=1)
     sizes = np.abs(np.where(is_judged[:, None], values, 0.0))

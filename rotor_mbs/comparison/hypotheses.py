@@ -25,7 +25,8 @@ class Hypothesis(Generic[Change]):
     Attributes
     ----------
     text : the cause, in words; "" if nothing is wrong.
-    change : another model, corrected data, or another component of loads.
+    change : another model, corrected data, another component of loads, or another factor and
+        reference point of moments.
     price : number of mistakes or parameters that the hypothesis assumes.
     """
 

@@ -309,8 +309,8 @@ def _suggested(table: DataTable, known: Sequence[Channel]) -> list[tuple[Channel
     table : the columns.
     known : all channels that the data may have.
     """
-    # A name such as "q[2]" is recognized only with the number of columns of its array "q": an array
-    # of angles has one column for each coordinate.
+    # To recognize a name such as "q[2]", the number of columns of its array "q" must be known: an
+    # array of angles has one column for each coordinate.
     places = places_of(list(table.columns))
     suggested = []
     for name in table.columns:

@@ -61,7 +61,8 @@ _STAGES = 4  # number of stages: reference, interval defects, search for causes,
 # If all errors are within the tolerance, a cause may leave at most this share of the largest one.
 _LEFT_OF_SMALL_ERRORS = 0.02
 # Largest number of references that are kept for further data of the same scene and times, and
-# largest number of rows of each. With three blades they take up to some 12 MB.
+# largest number of rows of each. With three blades, all kept references together take up to some
+# 12 MB.
 _MAX_KEPT, _MAX_KEPT_ROWS = 4, 20_000
 # Data may begin late, and end early, by at most this many times the largest interval between their
 # rows.
@@ -640,7 +641,7 @@ def _unchecked_parts(
 
     Parameters
     ----------
-    data : angles and rates; channels that a mapping file omits may be missing.
+    data : angles and rates. A missing angle is a finding unless the mapping file omits it.
     rows, errors : the data with their reference, and their errors.
     """
     defects, until = rows.defects, rows.until
@@ -728,8 +729,8 @@ def _likely_causes(
 
     If the data do not agree, mistakes in columns and times are searched for first, then other
     models. If the data agree, mistakes in columns and times are searched for only if a defect is
-    larger than the digits of the data explain. If none is found, other models are tried, because
-    small defects that are correlated may reveal one.
+    larger than the digits of the data explain. Other models are tried if no such mistake is found,
+    even if all defects are small: correlated small defects may reveal another model.
 
     Parameters
     ----------

@@ -43,7 +43,8 @@ class ChannelErrors:
         Angle: the largest defect of an interval in rad, after the defect of each interval is
         divided by its `bound_factors` (see `solution.defects`). Rate: the same, with the defects
         converted to rad by `Defects.rate_units`. Load: the largest error relative to the load's
-        largest magnitude. Frequency: the largest relative error.
+        largest magnitude. Frequency: the largest relative error. The divisors of the relative
+        errors have a lower limit, for loads and frequencies near zero.
     floor : largest estimated effect of rounding on a defect or relative error. The true effect may
         be `FLOOR_SAFETY` times as large.
     agrees_until : see the function `agrees_until`.
@@ -132,7 +133,7 @@ def as_dictionary(verdict: DataVerdict) -> dict[str, Any]:
 
 
 def from_dictionary(stored: Mapping[str, Any]) -> DataVerdict:
-    """Return the verdict in a dictionary of `as_dictionary`, which may have been stored as JSON."""
+    """Restore a verdict from the dictionary that `as_dictionary` returned, or from its JSON."""
     values: dict[str, Any] = {}
     for name, value in stored.items():
         values[name] = tuple(value) if isinstance(value, list) else value
