@@ -440,9 +440,11 @@ def _precision(columns: Sequence[Array], rounding: Sequence[Array]) -> str:
     # For numbers of one magnitude, a number of digits is also a number of decimals. The text says
     # "decimals" only if magnitudes differ and nearly all numbers have the same rounding.
     is_fixed = any(sizes.min() < 0.1 * sizes.max() for sizes, _ in rounded)
-    exceptions = [(last > 2.0 * last.min()).mean() for _, last in rounded]
+    # A number 0 has no rounding if its column has a fixed number of digits.
+    known = [last[last > 0.0] for _, last in rounded]
+    exceptions = [(last > 2.0 * last.min()).mean() for last in known]
     if is_fixed and max(exceptions) < _MAX_EXCEPTIONS:
-        decimals = sorted({round(-math.log10(2.0 * last.min())) for _, last in rounded})
+        decimals = sorted({round(-math.log10(2.0 * last.min())) for last in known})
         shown = " or ".join(map(str, decimals))
         return f"{shown} decimals{where}: rounding error {0.5 * 10.0 ** -decimals[0]:.0e}"
     return f"{digits} digits{where}: relative rounding error {0.5 * 10.0 ** (1 - digits):.0e}"

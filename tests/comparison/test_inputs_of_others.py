@@ -374,6 +374,20 @@ def test_right_numbers_of_any_digits_are_not_systematic(digits: int, run: rm.Run
         assert compared.likely == ()
 
 
+def test_a_column_of_zeros_with_few_numbers_of_five_digits_has_a_verdict() -> None:
+    """A zero has no rounding where the digits are fixed, from 1e-12 to 1e3 here; fewer than a
+    twentieth of the rows are another number."""
+    fine = rm.run(SCENE.replace(samples=501), "lagrange/dop853")
+    columns = by_name(fine)
+    sizes = 10.0 ** np.linspace(-12.0, 3.0, 12)
+    few = np.zeros(501)
+    few[20:500:40] = [float(f"{1.2345 * size:.4e}") for size in sizes]
+    columns[fine.scene.coordinate_labels[1]] = few
+    compared = rm.compare(columns, SCENE)
+    assert compared.status == "inaccurate"
+    assert any("5 digits" in note for note in compared.verdict.notes), compared.verdict.notes
+
+
 def test_digits_of_angles_are_told_beside_rates_with_all_digits(run: rm.Run) -> None:
     columns = by_name(run)
     for label in run.scene.coordinate_labels:
