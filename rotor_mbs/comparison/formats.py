@@ -755,10 +755,28 @@ def _with_vectors_as_columns(lines: list[tuple[int, str]]) -> list[tuple[int, st
             quoted = divider.join(f'"{label}"' for label in labels)
             expanded = []
             for number, line in lines:
-                text = quoted if line == above else divider.join(line.replace(divider, " ").split())
+                text = quoted if line == above else _expanded(line, divider, counts)
                 expanded.append((number, text))
             return expanded
     return lines
+
+
+def _expanded(line: str, divider: str, counts: Sequence[int]) -> str:
+    """Return a line with a separate field for each entry of a vector.
+
+    Parameters
+    ----------
+    line : a line of the file.
+    divider : separator of the fields.
+    counts : number of entries in each field. A field without text stands for as many empty fields.
+    """
+    fields = line.split(divider)
+    if len(fields) != len(counts):  # another kind of line, such as a comment
+        return divider.join(line.replace(divider, " ").split())
+    words: list[str] = []
+    for field, count in zip(fields, counts, strict=True):
+        words += field.split() or [""] * count
+    return divider.join(words)
 
 
 def _exudyn(

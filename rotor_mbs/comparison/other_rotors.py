@@ -552,11 +552,15 @@ def by_rows(
         yield Hypothesis(text, RotorModel(scene, method=method, steps=steps))
     if scene.has_constant_loads:
         return
-    # The first hypothesis, in which all changing loads are held, is skipped. `other_scenes` have a
-    # scene in which all loads are held, though from each kink of any load to the next.
+    # `other_scenes` have a scene in which all loads are held from a kink of any load to the next.
+    # If all changing loads have rows at the same times, it is the scene of the first hypothesis
+    # here, in which all changing loads are held: this hypothesis is then skipped.
+    changing = [table for table in scene.load_tables if not is_constant(table)]
+    row_times = {tuple(time for time, _ in table) for table in changing}
+    is_yielded_there = len(row_times) == 1
     held = _with_tables(scene, _held_from_row_to_row)
     how = "held from row to row of their tables"
-    yield from itertools.islice(_with_loads_of(scene, held, how), 1, None)
+    yield from itertools.islice(_with_loads_of(scene, held, how), int(is_yielded_there), None)
     for rows in (1, *_CYCLES):
         if 2 * rows < len(times):
             first = intervals // rows * rows

@@ -249,6 +249,10 @@ WRONG: dict[str, tuple[Callable[[Path], object], str]] = {
         "'kg'; allowed: rad, deg, turns",
     ),
     "NaN": (_write(HEAD + "0,1\n1,nan\n2,3\n"), "is nan in row 2 of 3"),
+    "a vector that is missing in a row": (
+        _write("time,q\n0,1 2 3 4\n1,\n2,1 2 3 4\n"),
+        "column 'q[0]' is empty in row 2 of 3 (line 3)",
+    ),
     "repeated time": (_write(HEAD + "0,1\n1,2\n1,3\n"), "the time of row 3, 1 s, repeats"),
     "two rows at one time": (
         _write(HEAD + "0,1\n2,2\n1,3\n2,4\n"),

@@ -38,13 +38,16 @@ def steps(*rows: tuple[float, float]) -> tuple[tuple[float, float], ...]:
 @functools.cache
 def short(name: str) -> Scene:
     """A shipped scene; "driven": fig. 11 with a torque that jumps; "sprung": that with three
-    different bearings."""
-    shipped = {"driven": "paper/fig11", "sprung": "paper/fig11", "ramped": "paper/fig11"}.get(
-        name, name
-    )
+    different bearings; "ramped", "two ramps": fig. 11 with loads that grow."""
+    own = ("driven", "sprung", "ramped", "two ramps")
+    shipped = "paper/fig11" if name in own else name
     scene = replace(rm.scene(shipped), duration=DURATION, samples=ROWS)
     if name in ("driven", "sprung"):
         scene = replace(scene, rotor_torque=steps((0.5, JUMP)))
+    if name == "two ramps":  # with rows at times of their own
+        rotor = ((0.0, 0.0), (1.0, JUMP), (DURATION, -JUMP))
+        pitch = ((0.0, 0.0), (0.3, 30.0), (1.4, -30.0), (DURATION, 10.0))
+        return replace(scene, rotor_torque=rotor, pitch_torque=(pitch, (), ()))
     if name == "ramped":
         scene = replace(rm.scene("paper/fig11"), duration=DURATION, samples=ROWS)
         return replace(scene, rotor_torque=((0.0, 0.0), (DURATION, JUMP)))
@@ -205,6 +208,19 @@ def half(values: Array) -> Array:
 def single_clock(time: Array, q: Array, w: Array) -> tuple[Array, Array, Array]:
     steps = np.append(np.float32(0.0), np.full(len(time) - 1, np.float32(0.01)))
     return np.cumsum(steps, dtype=np.float32).astype(float), q, w
+
+
+def held_tables(scene: Scene) -> Scene:
+    """Each load keeps the value of a row of its own table until the next."""
+
+    def held(table: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
+        return steps(*table) if table else ()
+
+    return replace(
+        scene,
+        rotor_torque=held(scene.rotor_torque),
+        pitch_torque=tuple(map(held, scene.pitch_torque)),
+    )
 
 
 def held_ramp(scene: Scene) -> Scene:
@@ -409,6 +425,9 @@ PLANTS = {
         "times are sums of 0.01 s in single precision", spoilt=single_clock
     ),
     "loads held": Plant("loads held from each row to the next", "ramped", changed=held_ramp),
+    "tables held": Plant(
+        "loads held from row to row of their tables", "two ramps", changed=held_tables
+    ),
     "gravity and c": Plant(
         "gravity off by -1 % (uncertainty",
         changed=lambda scene: off("offset", 0.01)(off("gravity", -0.01)(scene)),
