@@ -158,11 +158,12 @@ def run(
     ------
     InputError
         For an unknown method, for a setting that is unknown or not allowed, for a time limit or a
-        number of workers out of range, or if one of several methods cannot represent the scene.
+        number of workers out of range, for a file of several methods, or if one of several methods
+        cannot represent the scene.
     TypeError
         For any other argument of a wrong type, such as a text in place of a number.
     MethodRefusal
-        If a single method cannot represent the scene or is not installed.
+        If a single method cannot represent the scene or is not installed, or if no method is left.
     ResourceError
         If a worker process died or could not be started.
 

@@ -375,9 +375,9 @@ class StoredScene:
 
     @property
     def is_shipped(self) -> bool:
-        """Return whether the scene moves like the shipped scene of the same name.
+        """Return whether the scene is the shipped scene of the same name.
 
-        Samples and outputs may differ.
+        Only samples and outputs may differ.
         """
         return moves_as_shipped(self.changes)
 

@@ -1002,17 +1002,16 @@ class SceneChange(NamedTuple):
         return f"{self.key} {_exact_text(self.before)} -> {_exact_text(self.after)}"
 
 
-def scene_changes(before: Scene, after: Scene, ignored: Sequence[str] = ()) -> list[SceneChange]:
+def scene_changes(before: Scene, after: Scene) -> list[SceneChange]:
     """Return the differences of two scenes: a change for each key, or each entry of a list.
 
     Parameters
     ----------
     before, after : the scenes. Titles, figures, methods and settings are not compared. The tip is
         compared if both scenes store its path.
-    ignored : further keys that are not compared.
     """
     are_unequal = any(len(set(scene.blades)) > 1 for scene in (before, after))
-    left_out = {field.metadata["key"] for field in scene_fields("label")} | {*ignored}
+    left_out = {field.metadata["key"] for field in scene_fields("label")}
     old, new = (_values_by_path(scene, each_blade=are_unequal) for scene in (before, after))
     changes: list[SceneChange] = []
     for path in dict.fromkeys((*old, *new)):
@@ -1437,7 +1436,7 @@ def _implausible_blade(name: str, blade: Blade) -> list[str]:
     for key, point in (("centre_of_mass", blade.centre_of_mass), ("tip", blade.tip)):
         distance = math.hypot(*point)
         if not MIN_DISTANCE <= distance <= MAX_DISTANCE:
-            lines.append(f"{name}.{key}: {distance:g} m from the shaft; is it in m?")
+            lines.append(f"{name}.{key}: {distance:g} m from the apex; is it in m?")
     # No mass is much farther from the apex than the tip. The radius of gyration, a mean distance of
     # the mass, is therefore not much larger, either.
     gyration = math.sqrt(max(blade.inertia[:3]) / blade.mass) if blade.mass else 0.0

@@ -101,7 +101,8 @@ METRICS = {
     ),
     "defect_time": RowValue(
         "s",
-        "end of the interval that is furthest beyond its bound; if none is, of the largest defect",
+        "end of the interval with the largest defect beyond rounding in units of its bound; "
+        "of the largest defect if none is beyond rounding",
         "runs sweep",
     ),
     "defect_judged": RowValue(
@@ -125,7 +126,9 @@ METRICS = {
         "state transition matrix from its interval to the last of them",
         rounding=DRIFT_ROWS,
     ),
-    "defect_floor": RowValue("rad", "largest defect that rounding of the samples can cause"),
+    "defect_floor": RowValue(
+        "rad", "estimated largest effect of rounding of the samples on a defect"
+    ),
     "defects_not_judged": RowValue(
         "1",
         (

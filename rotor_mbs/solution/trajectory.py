@@ -315,7 +315,7 @@ class Solution:
     integration: Integration
     settings: Mapping[str, object] = field(default_factory=dict)
     setup_time_s: float = 0.0
-    run_times_s: list[float] = field(default_factory=lambda: [0.0])
+    run_times_s: list[float] = field(default_factory=list)
     output_time_s: float = 0.0
     status: str = ""
     message: str = ""

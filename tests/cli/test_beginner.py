@@ -88,7 +88,7 @@ MISTAKES: dict[str, tuple[dict[str, str], str, str]] = {
 SLIPS: dict[str, tuple[str, str, str]] = {
     "degrees": ('"deg(30)"', "30", '30 rad are 4.8 turns; degrees? write "deg(30)"'),
     "degrees per second": ("rates = [0,", "rates = [360,", 'write "deg(360)"'),
-    "millimetres": ("33.4]", "24000]", "24000 m from the shaft; is it in m?"),
+    "millimetres": ("33.4]", "24000]", "24000 m from the apex; is it in m?"),
     "gravity in cm": ("9.81", "981", "9.81 is usual"),
 }
 

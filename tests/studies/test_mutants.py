@@ -127,7 +127,7 @@ EXPLAINED = {
     r"lagrange\.defects\._(DOP853|RADIANS_PER_STEP|ROUGH_END) ": (
         "half as much again is within the accuracy that is asked of the matrices, or of a defect"
     ),
-    r"lagrange\.defects\._(FIT_ROUNDS|STANDS_STILL|NEAR) |fitted_rates .*(step \* np\.abs|usual <= )": (
+    r"lagrange\.defects\._(FIT_ROUNDS|STANDS_STILL|NEAR) |fitted_rates .*(step \* np\.abs|usual <= _STANDS)": (
         "where the rounds of a fit end: half as much again, or a round more, does as well"
     ),
     r"lagrange\.defects\._(SIDE|SMALLEST_SHARE|DIFFERENCE|SMALL_DIFFERENCE|SMALL_AT_END) ": (
@@ -149,7 +149,7 @@ EXPLAINED = {
         "the work is no part of a defect, wherever it begins"
     ),
     r"_advance_by_dop853 .*(0 -> 1|or 0$)": "SciPy counts its evaluations: there is no other case",
-    r"lagrange\.defects\._transitions ": (
+    r"lagrange\.defects\._transitions .*(0 -> 1$|time\[rows|if len\(rows\)|quick - .*scaled$|units scaled$)": (
         "more explicit steps, or difference quotients in place of them, are as accurate"
     ),
     r"_(difference|quick)_transitions .*(differences / |away / units|1 \+ count scaled)": (
