@@ -149,8 +149,9 @@ EXPLAINED = {
         "the work is no part of a defect, wherever it begins"
     ),
     r"_advance_by_dop853 .*(0 -> 1|or 0$)": "SciPy counts its evaluations: there is no other case",
-    r"lagrange\.defects\._transitions .*(0 -> 1$|time\[rows|if len\(rows\)|quick - .*scaled$|units scaled$)": (
-        "more explicit steps, or difference quotients in place of them, are as accurate"
+    r"lagrange\.defects\._transitions .*(0 -> 1$|time\[rows|if len\(rows\)|quick - .*(scaled|turned round)$|units scaled$)": (
+        "more explicit steps, or difference quotients in place of them, are as accurate; these are "
+        "taken unless every coordinate is on the side that is asked for"
     ),
     r"_(difference|quick)_transitions .*(differences / |away / units|1 \+ count scaled)": (
         "the size that is near enough; of a number of copies the fraction is cut off"
