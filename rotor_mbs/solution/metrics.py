@@ -101,8 +101,8 @@ METRICS = {
     ),
     "defect_time": RowValue(
         "s",
-        "end of the interval with the largest defect beyond rounding in units of its bound; "
-        "of the largest defect if none is beyond rounding",
+        "end of the interval with the largest ratio of defect beyond rounding to bound; of the "
+        "largest defect if none is beyond rounding",
         "runs sweep",
     ),
     "defect_judged": RowValue(

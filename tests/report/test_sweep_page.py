@@ -72,7 +72,9 @@ def test_a_sweep_opens_with_counts_and_what_its_parameters_do(
     low, high = facts_of(text)["Range of a pitch angle"].rstrip("°").split(" to ")
     # two digits
     assert (float(low), float(high)) == pytest.approx((ranges.min(), ranges.max()), rel=0.06)
-    assert "unit" not in text.partition("<main>")[2][:2000]
+    # A quantity without a unit is named without one.
+    assert "(rad)</option>" in text
+    assert "(1)</option>" not in text
 
 
 def test_every_cell_of_the_map_is_the_run_of_its_row_and_column(
