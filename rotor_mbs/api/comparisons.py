@@ -151,9 +151,9 @@ class DataComparison:
         it is the largest interval defect: three times the effect of rounding on each defect is
         subtracted, and the rest is divided by a factor for long intervals and error growth. For a
         load or a frequency it is the largest relative error, less three times the effect of
-        rounding. `floor` is the largest of these effects, as estimated. Both are in `defect_unit`.
-        The other columns have, for each of several levels, the time (s) up to which the errors stay
-        within the level; for modes the speed (rad/s).
+        rounding. `floor` is the largest of these effects, as estimated. The unit of `defect` and
+        `floor` is `defect_unit`. Each column `within LEVEL up to` has the time (s) up to which the
+        errors stay within the level; for modes the speed (rad/s).
         """
         rows = []
         for channel in self.verdict.channels:
@@ -164,9 +164,10 @@ class DataComparison:
         return data_frame({name: [row.get(name) for row in rows] for name in names}, {})
 
     def plot(self) -> Panels:
-        """Plot the defects of each coordinate over time with the tolerance.
+        """Plot the interval defects of the angles over time with the tolerance.
 
-        If no interval defects are known, for example for a table of modes, plot the errors.
+        If the data have no angles, plot the defects of the rates. If no interval defects are known,
+        for example for a table of modes, plot the errors.
         """
         # not at the top: it loads matplotlib
         from rotor_mbs.report.pages.comparison import defect_panels, error_panels
@@ -176,9 +177,10 @@ class DataComparison:
     def to_xarray(self) -> Any:
         """Return data, reference, errors and defects as an xarray.Dataset over time or speed.
 
-        The variables of a channel have its name: data `pitch_1`, then `pitch_1_reference`,
-        `pitch_1_error`, and for angles and rates `pitch_1_defect` (rad), the defect of the interval
-        before each row. Variables have units.
+        The names of a channel's variables begin with the name of the channel. The variable
+        `pitch_1` has the data. The other variables are `pitch_1_reference`, `pitch_1_error`, and
+        for angles and rates `pitch_1_defect` (rad), the defect of the interval before each row.
+        Variables have units.
         """
         import xarray  # not at the top: it takes 0.4 s
 

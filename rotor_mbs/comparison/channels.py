@@ -51,8 +51,8 @@ FREQUENCY_NAMES = {
     ),
 }  # fmt: skip
 LOAD_NAMES = tuple(load.name.replace("_", " ") for load in LOADS)
-# A scene has loads in the frame "blade" or "base". For each of these two frames, the other frames
-# in which data may have the same loads.
+# A scene has loads in the frame "blade" or "base". `FRAMES` has, for each of these two frames, the
+# other frames in which data may have the same loads.
 # The frame "blade" turns with the pitch. The frame "coned" is the frame "blade" at zero pitch. The
 # frame "rotor" turns with the rotor: its y axis is along the shaft, and its z axis is normal to the
 # shaft. For loads of a blade, this z axis is at the blade's azimuth. The frame "shaft" is the base
@@ -60,9 +60,9 @@ LOAD_NAMES = tuple(load.name.replace("_", " ") for load in LOADS)
 FRAMES = {"blade": ("coned", "rotor", "shaft", "base"), "base": ("shaft", "rotor")}
 LOAD_FRAMES = ("blade", *FRAMES["blade"])
 _FRAME_ENDINGS = [[frame, "frame"] for frame in LOAD_FRAMES]
-# Root loads of OpenFAST, which the blade exerts on the hub. Its x axis is along the shaft, z along
-# the blade, and y against the rotor's sense of rotation. The axes "b" turn with the pitch, the axes
-# "c" do not.
+# Root loads of OpenFAST, which the blade exerts on the hub. OpenFAST's x axis is along the shaft, z
+# along the blade, and y against the rotor's sense of rotation. The axes "b" turn with the pitch,
+# the axes "c" do not.
 _OPENFAST = re.compile(r"root([fm])([xyz])([bc])(\d+)", re.IGNORECASE)
 _OPENFAST_AXES = {"x": ("y", -1), "y": ("x", 1), "z": ("z", -1)}
 _UNIT_ENDING = re.compile(
@@ -406,7 +406,7 @@ def _channel_of_path(
 ) -> Channel | None:
     """Return the channel that a whole name suggests, None if it suggests none.
 
-    Parts of a path in the name are not tried alone.
+    A path such as "run/rates/rotor" is read as one name; `channel_from_name` tries its last part.
 
     Parameters
     ----------
@@ -448,9 +448,10 @@ def _channel_of_path(
     channel = _angle_or_rate(letters, numbers, known)
     if channel is None or entry is None:
         return channel
-    # Two kinds of arrays are not identified. An array of several rotor angles has the azimuths of
-    # the blades. An array of more pitches than blades may have the rotor as its first column. A
-    # pitch whose number has no brackets, as in "pitch_2", is identified: the number is the blade's.
+    # The columns of two kinds of arrays are not identified: of an array of several rotor angles,
+    # because they are the azimuths of the blades; and of an array of more pitches than blades,
+    # because its first column may be the rotor. A pitch whose number has no brackets, as in
+    # "pitch_2", is identified: the number is the blade's.
     blades = sum(other.kind == "angle" for other in known) - 1
     allowed = 1 if channel.name.startswith("rotor") else blades
     return (

@@ -399,7 +399,8 @@ def _behind_stroke(text: str) -> tuple[int, str] | None:
     Returns
     -------
     (int, str) or None
-        The position in `text` at which " /" begins, and the unit; None if the name has no such end.
+        The position in `text` of the blanks before " / unit", or of the stroke in " /unit"; the
+        unit. None if the name has no such end.
     """
     words = text.rsplit(maxsplit=2)
     if len(words) == 3 and words[1] == "/":

@@ -30,15 +30,15 @@ from rotor_mbs.solution.trajectory import Array
 # Numbers of significant digits. Whether numbers have a given number of digits is tested by
 # arithmetic up to _FEW_DIGITS digits, and by formatting them as text for more digits. A number
 # passes the test by text if its relative difference from the number in the text is at most
-# _ROUNDED_SINCE. This holds up to _SURE_DIGITS digits. For more digits both numbers must be equal:
-# a difference of _ROUNDED_SINCE is nearly as large as the rounding itself, and numbers that are not
-# rounded would pass, too (a third of them at 15 digits, nearly all at 16). No double needs more
-# than _ALL_DIGITS.
+# _ROUNDED_SINCE. This difference is allowed up to _SURE_DIGITS digits. For more digits, the number
+# and the number in the text must be equal. A difference of _ROUNDED_SINCE would be nearly as large
+# as the rounding itself, and numbers that are not rounded would pass, too (a third of them at 15
+# digits, nearly all at 16). No double needs more than _ALL_DIGITS.
 _FEW_DIGITS, _SURE_DIGITS, _ALL_DIGITS = 9, 14, 17
 # At most about this many numbers of a column, evenly spaced, are formatted as text: 1 us each.
 _MAX_WRITTEN = 20_000
 _ROUNDED_SINCE = 2.0 * 2.0**-52  # relative error of a unit conversion that follows the rounding
-_SINGLE_DIGITS = 8  # number of significant digits of single precision
+_SINGLE_DIGITS = 8  # numbers with fewer significant digits are not called single precision
 _SINGLE = 2.0**-24  # relative rounding error of single precision
 # A column is said to have a fixed number of decimals if at most this share of its numbers has a
 # coarser rounding than the others.
@@ -62,7 +62,8 @@ class ForeignData:
     rounding, time_rounding : (n, channels), (n,) half a unit in the last written digit of each
         number, in SI units. Times with nearly equal intervals are taken as exact to double
         precision, or as sums of a step in double precision, see `rounding_of_steps`.
-    read : a line for each channel: column, unit, and what was assumed.
+    read : a line for each channel: column, unit, and what was assumed. For OpenFAST's output, the
+        first line says how its columns are read.
     unused : for every other column, by its name, the reason why it is not compared.
     loads_left_out : names of the loads that are in unused columns although the mapping does not
         omit them.
@@ -367,7 +368,8 @@ def rounding_of_printed(
     ----------
     values : (n,) numbers of a column.
     others : groups of columns. If `values` has few distinct numbers, the rounding is found from
-        `values` and the first group together; if these are too few again, the next group is used.
+        `values` and the first group together. If `values` and this group have few distinct numbers,
+        too, the next group replaces the first.
     min_distinct : if there are fewer distinct numbers than this, the numbers are taken as exact to
         double precision.
 
@@ -457,7 +459,7 @@ def _time_precision(time: Array, rounding: Array, unit: str) -> str:
     ----------
     time, rounding : (n,) times as they were written, and the rounding of each, in the unit of the
         file.
-    unit : the unit of the file. If it is not s, the text has it after the rounding error.
+    unit : the unit of the file. A text with a number of decimals ends with it, unless it is s.
     """
     text = _precision([time], [rounding])
     if "decimals" in text and unit not in ("", "s"):
@@ -473,7 +475,7 @@ def _significant_digits(values: Array) -> int:
     if not np.isfinite(nonzero).all():
         return _ALL_DIGITS
     for digits in range(1, _ALL_DIGITS):
-        # The first values rule out most numbers of digits; that saves a test of all values.
+        # For most `digits` the first values already fail; the test of all values is then saved.
         if _have_digits(nonzero[:_SAMPLE], digits) and _have_digits(nonzero, digits):
             return digits
     return _ALL_DIGITS

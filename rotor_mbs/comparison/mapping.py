@@ -172,7 +172,8 @@ class FoundChannels:
     Attributes
     ----------
     sources : the source of each channel, with its unit; the time or speed is first.
-    lines : a line for each channel that states its source.
+    lines : a line for each channel that states its source. For OpenFAST's output, the first line
+        says how its columns are read.
     unused : for every other column or part of a file, by its name, the reason why it is not
         compared.
     loads_left_out : names of loads that the names of columns suggest, but that are neither compared
@@ -393,7 +394,7 @@ def _sources(
 
 
 def _without_frame(channel: Channel) -> Channel:
-    """Return a channel without the frame in its name. Its `key` is then that of mapping files."""
+    """Return a channel without the frame in its name, so that its `key` is a key of mappings."""
     return replace(channel, name=channel.name.partition(",")[0])
 
 

@@ -58,7 +58,8 @@ from rotor_mbs.solution.trajectory import Array, Trajectory
 _TIME_ROUNDING = 1e-9
 _MIN_ROWS = 3  # fewer rows are too few to be compared
 _STAGES = 4  # number of stages: reference, interval defects, search for causes, loads
-# If all errors are within the tolerance, a cause may leave at most this share of the largest one.
+# If the data agree, a mistake counts as a cause only if the error that it leaves is at most this
+# share of the largest error.
 _LEFT_OF_SMALL_ERRORS = 0.02
 # Largest number of references that are kept for further data of the same scene and times, and
 # largest number of rows of each. With three blades, all kept references together take up to some
@@ -116,8 +117,8 @@ class TrajectoryErrors:
     error : (rows, channels) magnitudes of the errors against the reference, rad and rad/s.
     per_growth : (rows, channels) `error` divided by `carried_errors`, the size to which a relative
         error of 1 at the start may have grown.
-    excess_per_growth : (channels,) as `per_growth`, but of the part of `error` beyond rounding
-        only; the largest value up to the horizon.
+    excess_per_growth : (channels,) the part of `error` beyond rounding, divided by
+        `carried_errors`; the largest value up to the horizon.
     predicted, defect_time : see `DataVerdict`.
     drift : rad, the largest sum of defects over 10 or 100 rows (`STRETCHES`), beyond rounding.
     drifting : channel and number of rows of `drift`, in words.
@@ -397,8 +398,8 @@ def _errors_of(
     sums = _largest_sums(scene, rows.defects)
     beyond_digits = _beyond_digits(scene, tolerance, rows.defects)
     # Errors divided by the error growth reveal faults that the defects do not: faults below the
-    # tolerance in each interval that add up. The division removes what merely grew from an error of
-    # the initial state.
+    # tolerance in each interval that add up. An error that has only grown from a small error of the
+    # initial state remains small after the division.
     exact = rows.exact
     carried = carried_errors(exact.trajectory, exact.growth, exact.units)
     carried = carried[rows.places][:, data.columns]
@@ -597,7 +598,7 @@ def _wrong_errors(
         size = f"error {channel.error_max:.1e} {channel.unit} up to the horizon"
         allowed = f"{growing:.1e} per unit of error growth, allowed {tolerance:.0e}"
         yield "inaccurate", f"{channel.name}: {size}, {allowed}"
-    # The bound is for angles; it is applied to rates where the data have no angles.
+    # `bound`, below, is for angles. It is applied to rates only if the data have no angles.
     angles = [channel for channel in errors.channels if channel.unit == "rad"]
     largest = max(angles or errors.channels, key=lambda channel: channel.error_max)
     # If no defects are known, only the errors can be judged: then the tolerance is their bound.

@@ -75,7 +75,7 @@ class DataVerdict:
     defect_time : s, end of the interval with the largest defect; None if it is unknown.
     predicted : rad, the largest error of an angle up to the horizon that the defects predict; None
         if it is unknown.
-    read : one line for each channel on how its column was read.
+    read : one line for each channel on how its column was read, see `ForeignData.read`.
     unused : for the name of each column that is not used, the reason.
     notes : what else a user should know.
     likely : likely causes of the difference, in words; empty if none is found or searched for.
