@@ -201,7 +201,7 @@ def _is_interrupt(error: BaseException) -> bool:
 def _signal_main_thread(number: signal.Signals) -> None:
     """Send a signal to the main thread, which also breaks off a system call such as a sleep."""
     if not callable(signal.getsignal(number)):
-        return  # the handler is removed after the command: now the signal would end the process
+        return  # the command has ended and its handler is removed: the signal would end the process
     if hasattr(signal, "pthread_kill"):
         main_thread_id = threading.main_thread().ident
         assert main_thread_id is not None  # None only before a thread starts

@@ -96,10 +96,11 @@ def span(text: str, unit: str = "rad/s") -> tuple[float, ...]:
             numbers = []
             for i in range(count):
                 speed = first + (last - first) * i / (count - 1)
-                # A speed at the change of sign is 0, without a rounding error.
+                # A speed that differs from 0 by a rounding error only is set to 0.
                 numbers.append(0.0 if abs(speed) <= rounding else speed)
             # If FROM and TO differ by a few units of rounding only, there are fewer than COUNT
-            # different numbers between them. A speed such as 1e-320 has an infinite inverse.
+            # different numbers between them. Speeds that are too close to 0 are refused, because
+            # the inverse of a speed such as 1e-320 is infinite.
             slowest = min(abs(speed) for speed in numbers if speed)
             if len(set(numbers)) == count and slowest >= _MIN_SPEED:
                 return tuple(numbers)
@@ -176,9 +177,9 @@ class _Parser(argparse.ArgumentParser):
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
-        # Of the words that begin with "-", argparse itself takes only plain numbers for values, and
-        # all others for options. Here, no option begins with a digit: "-1e-6" and "-1:3:5" are
-        # values, too.
+        # argparse reads a word that begins with "-" as an option, unless it is a plain number. No
+        # option of this program begins with a digit. Words such as "-1e-6" and "-1:3:5" are
+        # therefore read as values, too.
         self._negative_number_matcher = re.compile(r"-\.?[0-9]")
 
     def error(self, message: str) -> NoReturn:
@@ -313,7 +314,7 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
         name : name of the command.
         text : description of the command.
         function : function that performs the command, "module:function" in `rotor_mbs.cli`.
-        *examples : arguments for the examples in the help: each follows the name in one example.
+        *examples : arguments of the command, one text for each example in the help.
         """
         lines = ["example:"]
         for example in examples:
@@ -571,9 +572,9 @@ def _parser() -> tuple[_Parser, dict[str, _Parser]]:
     options.settings()
     options.output(file, "FILE", Path("stability.h5"))
     options.jobs()
-    options.timeout(
-        8.0, "; at least 120 for lagrange/taylor"
-    )  # many runs of the suite reach any limit; with a short limit the suite takes minutes
+    # Many runs of the stability suite reach the time limit, however long it is. With this short
+    # limit the suite takes minutes.
+    options.timeout(8.0, "; at least 120 for lagrange/taylor")
 
     options = command(
         "modes",

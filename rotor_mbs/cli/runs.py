@@ -24,8 +24,8 @@ from rotor_mbs.studies.run import run_scenes
 def run(arguments: argparse.Namespace) -> int:
     """Run scenes with methods, and print a table of the runs and a summary.
 
-    If methods are named with -m, these run; otherwise those that a scene's file names; otherwise
-    methods that a rule selects for the scene.
+    The methods of a scene are those named with -m. Without -m they are the methods listed in the
+    scene's file. If the file lists none, a rule selects methods for the scene.
 
     Parameters
     ----------

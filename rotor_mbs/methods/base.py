@@ -114,7 +114,7 @@ class BuiltItem:
 
     Attributes
     ----------
-    kind : node, object, marker, load, sensor, equation or term.
+    kind : node, object, marker, load, sensor, equation, term or output.
     name : name of the item.
     detail : further description.
     """
@@ -130,7 +130,8 @@ class Solver(Protocol):
     def integrate(self) -> Integration:
         """Integrate from the initial state to the end.
 
-        The time of this call is the run time of the method. The call does no other work.
+        The time of this call is stored as the run time of the method. The call must therefore do
+        nothing but integrate.
         """
 
     def observe(self) -> Trajectory:

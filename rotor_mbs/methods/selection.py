@@ -48,7 +48,8 @@ def settings_for(names: Sequence[str], given: Mapping[str, object]) -> dict[str,
         For a setting that none of the methods has, and for a value that is not allowed.
     """
     if len(names) == 1:
-        # For a single method, the message of this check lists the allowed values of each setting.
+        # For a single method, an unknown setting is reported here: this message lists the allowed
+        # values of all settings, the message below only their names.
         find_method(names[0]).settings.of(names[0], given)
     declared = {name: find_method(name).settings.declared() for name in names}
     known = list(dict.fromkeys(setting for settings in declared.values() for setting in settings))
@@ -130,12 +131,12 @@ def problems_of_scene(values: Mapping[str, Any]) -> list[KeyProblem]:
 
 @dataclass(frozen=True)
 class Refusal:
-    """A run that is left out because its method or its settings do not fit the scene.
+    """A run that is left out, such as one whose method or settings do not fit the scene.
 
     Attributes
     ----------
     scene : name of the scene.
-    method : name of the method; "" if no method was selected for the scene.
+    method : name of the method; "" if the scene is left out with all methods.
     reason : why the run is left out, in one sentence.
     is_asked : whether the user asked for the run. It is true for a named method, and for a scene
         without any method. For a method that a rule selected, it is true only if the call or the
@@ -161,7 +162,8 @@ def supporting_methods(
 ) -> tuple[list[str], list[Refusal]]:
     """Return which methods can run a scene, and a Refusal for each that cannot.
 
-    All commands use this function to decide which runs they leave out.
+    The commands `run`, `reproduce`, `check`, `bench`, `stability` and `sweep` use this function to
+    decide which methods they leave out.
 
     Parameters
     ----------
@@ -202,7 +204,7 @@ def supporting_methods(
 
 
 def _reason(error: Exception, method: str) -> str:
-    """Return the text of an error without the name that stands in front of it."""
+    """Return the text of an error without the name of the method or scene at its beginning."""
     return str(error).removeprefix(f"{method}: ")
 
 

@@ -39,7 +39,7 @@ def solve(
     ----------
     method : the method, or its name.
     scene : the scene.
-    settings : values by name of the settings that differ from the method's defaults.
+    settings : values by name of the setting. Settings that are not given have their defaults.
     repeats : largest number of integrations. The samples are those of the last one.
     budget_s : s, for all integrations together. The first integration is not limited by it. A
         further one is begun only if it is expected to end within the budget.
@@ -84,7 +84,7 @@ def solve(
                     integration = solver.integrate()
                     run_times.append(time.perf_counter() - start)
                     _check_report(method, solver, integration)
-                    # The time limit interrupts only once: a further integration would have none.
+                    # The time limit interrupts only once: it would not end a further integration.
                     if integration.out_of_time:
                         break
         finally:

@@ -144,7 +144,8 @@ def _put_table(file: Any, table: TableSpec) -> dict[str, tuple[int, int]]:
 def begin_file(place: Path | str, **driver: object) -> Any:
     """Create an HDF5 file with the attributes of this program's format.
 
-    Without a `driver` the file is on the disk, where its space must be reserved before.
+    `driver` has the options of an HDF5 driver for `h5py.File`. Without these options the file is on
+    the disk, and the caller must have reserved space for it.
     """
     file = h5py.File(place, "w", libver=("earliest", "v108"), track_order=True, **driver)
     file.attrs["Conventions"] = CONVENTIONS
@@ -261,8 +262,8 @@ def new_file(path: Path, kind: str) -> Iterator[Any]:
     """Yield an HDF5 file in memory, which is written to `path` after the block.
 
     HDF5 makes the file in memory, because HDF5 does not survive a disk that fills up. If the file
-    cannot be written, an earlier file at `path` is unchanged. The caller must ask `may_extend`
-    before whether an earlier file may be replaced.
+    cannot be written, an earlier file at `path` is unchanged. Before this call, the caller must
+    check by `may_extend` whether an earlier file may be replaced.
 
     Parameters
     ----------

@@ -37,7 +37,8 @@ class RowLocation:
     ----------
     path : the file.
     inode : inode of the file. If another file has this path now, nothing is written to it.
-    first : number of the first row, which is the initial value of its checksum.
+    first : initial value of the first row's checksum: the number of its run if runs are numbered,
+        otherwise the number of the row in the table.
     offsets : for each column, bytes from the beginning of the file to the value of the first row.
     row_type : type of a row; its columns are in the order in which the checksum covers them.
     """
@@ -185,16 +186,17 @@ class RowLocation:
 
 
 def checksums(first: int, rows: Rows, row_type: np.dtype[np.void]) -> NDArray[np.uint32]:
-    """Return the CRC-32 of each row over its number and its columns, (rows,) uint32.
+    """Return the CRC-32 of each row over its columns, (rows,) uint32.
 
     Parameters
     ----------
-    first : number of the first row.
+    first : initial value of the first row's checksum, see `RowLocation`. It increases by 1 from row
+        to row.
     rows : columns of the rows.
     row_type : type of a row, in the order of the checksum.
     """
-    # The initial value is the number of the row, so that a row at the location of another one is
-    # detected.
+    # Each row has its own initial value, so that a row that was written at the location of another
+    # row is detected.
     sums = [(first + i) & 0xFFFFFFFF for i in range(len(rows["status"]))]
     for name in row_type.names or ():
         if name == "crc32":
@@ -231,7 +233,7 @@ def row_of_run(run: Solution, place: RowLocation, facts: Mapping[str, object]) -
     Parameters
     ----------
     run : the run.
-    place : location of the row, whose columns are filled.
+    place : location of the row. It determines which columns the returned row has.
     facts : further values by name of the column.
     """
     integration = run.integration

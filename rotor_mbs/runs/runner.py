@@ -29,8 +29,8 @@ _REPORTED = ("status", "message", "run_time_s")
 class RunOutcome:
     """The outcome of a run, or of another part of a study such as a curve of a bench.
 
-    The function call that returns it has computed the run, tried to compute it, or found it in the
-    file.
+    A function such as `studies.run.run_scenes` returns an outcome for each run that it computed,
+    tried to compute, or found in the file.
 
     Attributes
     ----------
@@ -101,7 +101,7 @@ class Task(ABC):
 
     @property
     def first(self) -> int:
-        """Return the number of the first row, which is the initial value of its checksum."""
+        """Return the initial value of the first row's checksum, see `RowLocation`."""
         return self.place.first
 
     @abstractmethod

@@ -313,8 +313,8 @@ class TableFile:
         scene = str(stored.column("scene")[row])
         arrays = self.tables[scene]
         label = run.removeprefix(f"{scene}/")
-        # The columns of /runs come first. Those of the scene's table follow; columns that it
-        # repeats get other names.
+        # The columns of /runs come first, then those of the scene's table. A column of the scene's
+        # table that repeats a column of /runs gets another name.
         offsets = dict(place.offsets)
         kinds = [(name, place.row_type[name]) for name in place.row_type.names or ()]
         of_arrays = arrays.place(arrays.row_of[label])
