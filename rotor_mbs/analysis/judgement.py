@@ -156,7 +156,7 @@ def clearly_ok(
         ]
     )
     complete &= angles <= ANGLE_LIMIT
-    shares = [rotor_inertia_shares(scene, np.array([scene.initial_angles]))[0] for scene in scenes]
+    shares = _initial_inertia_shares(scenes)
     within = [
         run["energy_drift_max"] <= energy
         and not run.get("defects_not_judged", 0.0)
@@ -164,7 +164,26 @@ def clearly_ok(
         and run.get("angle_error_predicted", 0.0) <= OK_ERROR
         for run in metrics
     ]
-    return np.asarray(complete & np.array(within) & (np.array(shares) > _CLEAR_SHARE))
+    return np.asarray(complete & np.array(within) & (shares > _CLEAR_SHARE))
+
+
+def _initial_inertia_shares(scenes: Sequence[Scene]) -> Array:
+    """Return the share `rotor_inertia_shares` at the initial angles of each scene, (k,).
+
+    Parameters
+    ----------
+    scenes : (k,) scenes, of one rotor or of several.
+    """
+    # In most sweeps over initial states all scenes have one rotor. Its coefficients, which are
+    # computed in rational numbers, are then computed once.
+    scenes_of_rotor: dict[tuple[object, ...], list[int]] = {}
+    for number, scene in enumerate(scenes):
+        scenes_of_rotor.setdefault(scene.rotor_key, []).append(number)
+    shares = np.empty(len(scenes))
+    for numbers in scenes_of_rotor.values():
+        angles = np.array([scenes[number].initial_angles for number in numbers])
+        shares[numbers] = rotor_inertia_shares(scenes[numbers[0]], angles)
+    return shares
 
 
 def _is_close(scene: Scene, status: str, metrics: Metrics) -> bool:

@@ -90,7 +90,7 @@ def reproduce(arguments: argparse.Namespace) -> int:
     has_outputs = all(path.is_file() for path in (results, index, summary, stamp))
     if (
         has_outputs
-        and stamp.read_text() == made_from(results, arguments.timeout)
+        and stamp.read_bytes() == made_from(results, arguments.timeout).encode()
         and not is_being_written(results)
     ):
         print(f"{results}: nothing to do, every run is already stored")
@@ -103,7 +103,7 @@ def reproduce(arguments: argparse.Namespace) -> int:
             replace_file(
                 stamp, made_from(results, arguments.timeout).encode(), rb"\A[0-9a-f]{64}\Z"
             )
-    print_table(summary.read_text(encoding="utf-8"))
+    print_table(summary.read_text(encoding="utf-8", errors="replace"))
     print(f"report: {index}\n{time.monotonic() - start:.1f} s")
     return status
 

@@ -249,6 +249,17 @@ def test_a_run_that_failed_or_is_not_complete_is_not_clearly_ok(
     assert is_ok == expected
 
 
+def test_singular_starts_of_several_rotors_are_not_clearly_ok() -> None:
+    """Point masses without a hub are singular at pitches of π/2, and with a hub they are not."""
+    quarter = 0.5 * math.pi
+    singular = SCENE.replace(**{"initial.angles": [0.0, quarter, quarter, quarter]})
+    scenes = [SCENE, singular, singular.replace(**{"hub.inertia": 1e5}), SCENE, singular]
+    metrics = [{"energy_drift_max": 0.0}] * 5
+    engines, samples = [DONE] * 5, [SCENE.samples] * 5
+    found = clearly_ok(scenes, METHOD, engines, samples, metrics, np.ones(5))
+    assert list(found) == [True, False, True, True, False]
+
+
 def test_a_bound_of_more_than_a_hundredth_of_a_radian_counts_as_that(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -149,3 +149,27 @@ def test_another_time_limit_or_other_code_is_looked_into(
     assert again("--timeout", "5")
     monkeypatch.setattr(reproduce, "versions", lambda: {"rotor_mbs": "other code"})
     assert again("--timeout", "5")
+
+
+def test_a_stamp_of_no_text_is_refused_in_one_line_and_stays(
+    again: Callable[..., bool], folder: Path
+) -> None:
+    """The stamp says which output files the report was made from; a damaged one says nothing."""
+    assert again()
+    stamp = folder / "report/.made-from"
+    stamp.write_bytes(b"\xff\xfe" * 32)
+    ended = rotor_mbs("reproduce", "-j", 1, "-o", folder)
+    assert ended.status == 2
+    assert ".made-from" in ended.err
+    assert "Traceback" not in ended.err
+    assert stamp.read_bytes() == b"\xff\xfe" * 32
+
+
+def test_a_summary_that_is_no_text_is_shown_all_the_same(
+    again: Callable[..., bool], folder: Path
+) -> None:
+    assert again()
+    (folder / "report/summary.txt").write_bytes(b"result \xff\n")
+    ended = rotor_mbs("reproduce", "-j", 1, "-o", folder)
+    assert ended.status == 0
+    assert "result" in ended.out

@@ -282,7 +282,7 @@ _TARGETS = (
     Target(
         f"{_A}.judgement",
         "judge clearly_ok _is_close largest_angle_error _status _too_far_apart "
-        "smallest_rotor_inertia_share "
+        "smallest_rotor_inertia_share _initial_inertia_shares "
         "_RESEMBLES _RESEMBLING_ANGLE _CLEAR_SHARE",
         "tests alone",
         (*_RULES, *_SWEEP),
