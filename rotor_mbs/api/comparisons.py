@@ -63,8 +63,8 @@ def compare(
         unit, sign, offset, frame, and whether whole turns are missing; also `omit`, `only`,
         `group`, `program`, `openfast`. By default columns are identified by their names;
         `verdict.read` of the result lists them.
-    tolerance : bound on interval defects, beyond what the rounding of the data explains (rad);
-        relative bound on loads and frequencies.
+    tolerance : rad, the largest allowed interval defect, beyond what the rounding of the data
+        explains. For loads and frequencies it is the largest allowed relative error.
     timeout : time limit for the reference, the defects and the search for causes (s).
     progress : whether to show the progress. By default on a terminal and in a notebook.
 
@@ -151,8 +151,8 @@ class DataComparison:
         it is the largest interval defect: three times the effect of rounding on each defect is
         subtracted, and the rest is divided by a factor for long intervals and error growth. For a
         load or a frequency it is the largest relative error, less three times the effect of
-        rounding. `floor` is the largest of these effects, as estimated. The unit of `defect` and
-        `floor` is `defect_unit`. Each column `within LEVEL up to` has the time (s) up to which the
+        rounding. `floor` is the largest estimated effect of rounding on a defect or relative error,
+        not multiplied by three. The unit of `defect` and `floor` is `defect_unit`. Each column `within LEVEL up to` has the time (s) up to which the
         errors stay within the level; for modes the speed (rad/s).
         """
         rows = []
@@ -177,10 +177,10 @@ class DataComparison:
     def to_xarray(self) -> Any:
         """Return data, reference, errors and defects as an xarray.Dataset over time or speed.
 
-        The names of a channel's variables begin with the name of the channel. The variable
-        `pitch_1` has the data. The other variables are `pitch_1_reference`, `pitch_1_error`, and
-        for angles and rates `pitch_1_defect` (rad), the defect of the interval before each row.
-        Variables have units.
+        The names of a channel's variables begin with the name of the channel, with "_" for blanks.
+        For the channel "pitch 1", for example, the variable `pitch_1` has the data. The other
+        variables are `pitch_1_reference`, `pitch_1_error`, and for angles and rates
+        `pitch_1_defect` (rad), the defect of the interval before each row. Variables have units.
         """
         import xarray  # not at the top: it takes 0.4 s
 

@@ -31,13 +31,15 @@ from rotor_mbs.solution.trajectory import Array
 # arithmetic up to _FEW_DIGITS digits, and by formatting them as text for more digits. A number
 # passes the test by text if its relative difference from the number in the text is at most
 # _ROUNDED_SINCE. This difference is allowed up to _SURE_DIGITS digits. For more digits, the number
-# and the number in the text must be equal. A difference of _ROUNDED_SINCE would be nearly as large
-# as the rounding itself, and numbers that are not rounded would pass, too (a third of them at 15
-# digits, nearly all at 16). No double needs more than _ALL_DIGITS.
+# and the number in the text must be equal: the rounding to so many digits is hardly larger than
+# _ROUNDED_SINCE. If this difference were allowed, numbers that are not rounded would pass, too (a
+# third of them at 15 digits, nearly all at 16). No double needs more than _ALL_DIGITS.
 _FEW_DIGITS, _SURE_DIGITS, _ALL_DIGITS = 9, 14, 17
 # At most about this many numbers of a column, evenly spaced, are formatted as text: 1 us each.
 _MAX_WRITTEN = 20_000
-_ROUNDED_SINCE = 2.0 * 2.0**-52  # relative error of a unit conversion that follows the rounding
+# Largest relative error of a number that was rounded to few digits and then converted to another
+# unit. The conversion causes this error.
+_ROUNDED_SINCE = 2.0 * 2.0**-52
 _SINGLE_DIGITS = 8  # numbers with fewer significant digits are not called single precision
 _SINGLE = 2.0**-24  # relative rounding error of single precision
 # A column is said to have a fixed number of decimals if at most this share of its numbers has a
@@ -64,14 +66,16 @@ class ForeignData:
         precision, or as sums of a step in double precision, see `rounding_of_steps`.
     read : a line for each channel: column, unit, and what was assumed. For OpenFAST's output, the
         first line says how its columns are read.
-    unused : for every other column, by its name, the reason why it is not compared.
+    unused : for every column or part of a file that is no channel, by its name, the reason why it
+        is not compared.
     loads_left_out : names of the loads that are in unused columns although the mapping does not
         omit them.
     wrapped : for each channel, whether the file has the angle without its whole turns.
     precision : precision of the numbers in words, as a number of decimals ("4 decimals: rounding
         error 5e-05"), as a number of digits, or as single precision; "" if the numbers have hardly
         any rounding.
-    time_precision : precision of the times in words; "" also if nearly all intervals are equal.
+    time_precision : precision of the times in words. It is "" if the times have hardly any
+        rounding, or if nearly all intervals are equal.
     notes : what was done to the rows, a line each.
     omitted : names of the channels that the mapping omits: the data need not have them.
     restricted_to : names of the channels to which the mapping restricts the comparison; empty if
@@ -190,7 +194,8 @@ def data_of_table(
     ----------
     table : named columns of numbers.
     scene : the scene whose channels the columns may be.
-    mapping : the channels of columns; by default channels are recognized by the names of columns.
+    mapping : content of the mapping file; by default channels are recognized by the names of
+        columns.
 
     Raises
     ------
@@ -423,7 +428,9 @@ def _precision(columns: Sequence[Array], rounding: Sequence[Array]) -> str:
     rounding : (n,) rounding of each column, by `rounding_of_printed`.
     """
     rounded = []
-    digits = 0  # largest number of digits of the rounded columns; the other columns may have 17
+    # Largest number of digits of the columns in `rounded`. Columns that are not rounded may have 17
+    # digits; they are not counted.
+    digits = 0
     for values, last in zip(columns, rounding, strict=True):
         sizes = np.abs(values)
         if (last > 10.0**-_FEW_DIGITS * sizes).any():
@@ -459,7 +466,8 @@ def _time_precision(time: Array, rounding: Array, unit: str) -> str:
     ----------
     time, rounding : (n,) times as they were written, and the rounding of each, in the unit of the
         file.
-    unit : the unit of the file. A text with a number of decimals ends with it, unless it is s.
+    unit : the unit of the times in the file. If the returned text states a number of decimals, it
+        ends with this unit, unless the unit is s.
     """
     text = _precision([time], [rounding])
     if "decimals" in text and unit not in ("", "s"):
