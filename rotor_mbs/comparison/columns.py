@@ -34,8 +34,8 @@ class DataColumn(NamedTuple):
     unit : the unit that the file states; "" if it states none.
     step : step between the numbers, in the same unit, if they are packed as integers; otherwise 0.
     missing : text for messages about the first missing number, with its row: "empty in row 2 of 9
-        (line 3)". It is "" if no number is missing, and in data whose missing numbers are NaN,
-        such as arrays.
+        (line 3)". It is "" if no number is missing. It is also "" if the data have NaN for missing
+        numbers when they are read, as arrays do.
     """
 
     values: NDArray[np.float64]
@@ -60,17 +60,17 @@ class LeftOut(NamedTuple):
 
 @dataclass(frozen=True)
 class DataTable:
-    """The columns of a file.
+    """The columns of a file, or of arrays that a caller passes.
 
     Attributes
     ----------
-    source : name of the file in messages.
+    source : name of the file in messages; "data" for arrays.
     columns : the columns by name, in the order of the file.
     left_out : for each other part of the file, by its name, the reason why it is not read as a
         column of numbers.
     program : "openfast" if the head of the file says that OpenFAST wrote it, otherwise "".
-    headers : original names, by the new name, of columns that were renamed because an earlier
-        column has the same name.
+    headers : the names in the file of renamed columns, by the new name. A column is renamed if an
+        earlier column has the same name.
     """
 
     source: str
@@ -242,7 +242,9 @@ class _NotNumbersError(Exception):
 
 
 def _numbers(values: Any) -> tuple[NDArray[Any], str]:
-    """Convert values to an array of numbers, and return it with its unit if they are durations.
+    """Convert values to an array of numbers, and return the array and its unit.
+
+    Only durations have a unit here: they are converted to seconds.
 
     Parameters
     ----------

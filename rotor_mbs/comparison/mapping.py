@@ -172,12 +172,12 @@ class FoundChannels:
     Attributes
     ----------
     sources : the source of each channel, with its unit; the time or speed is first.
-    lines : a line for each channel that states its source. For OpenFAST's output, the first line
-        says how its columns are read.
+    lines : one line for each channel; the line states the source of the channel. For OpenFAST's
+        output, an additional first line says how its columns are read.
     unused : for every other column or part of a file, by its name, the reason why it is not
         compared.
-    loads_left_out : names of loads that the names of columns suggest, but that are neither compared
-        nor omitted by the mapping.
+    loads_left_out : names of loads that are not compared, although columns with their names exist
+        and the mapping does not omit them. They are missing in the mapping's `only`.
     """
 
     sources: Mapping[Channel, ColumnMapping]
