@@ -199,7 +199,10 @@ def _is_interrupt(error: BaseException) -> bool:
 
 
 def _signal_main_thread(number: signal.Signals) -> None:
-    """Send a signal to the main thread, which also breaks off a system call such as a sleep."""
+    """Send a signal to the main thread.
+
+    Except on Windows, the signal also ends a system call of that thread early, such as a sleep.
+    """
     if not callable(signal.getsignal(number)):
         return  # the command has ended and its handler is removed: the signal would end the process
     if hasattr(signal, "pthread_kill"):

@@ -21,7 +21,8 @@ from rotor_mbs.scenario.toml_file import file_path
 REPRODUCED = Path("rotor-mbs-out")  # default output folder of `reproduce`
 EXPORT_FORMATS = ("mjcf", "exudyn", "csv")
 
-_MIN_SPEED, _MAX_SPEED = 1e-25, 1e25  # rad/s, as for numbers in a scene
+# Limits of the size of a speed that is not 0, in rad/s. Numbers in a scene have the same limits.
+_MIN_SPEED, _MAX_SPEED = 1e-25, 1e25
 _SPEED_UNITS = {"rad/s": 1.0, "rpm": math.pi / 30.0}
 _MAX_SPAN = 10_000  # largest COUNT in FROM:TO:COUNT
 _MAX_NUMBER = 1e9  # largest count, and largest time in s (thirty years)
