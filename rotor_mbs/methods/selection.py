@@ -138,9 +138,10 @@ class Refusal:
     scene : name of the scene.
     method : name of the method; "" if the scene is left out with all methods.
     reason : why the run is left out, in one sentence.
-    is_asked : whether the user asked for the run. It is true for a named method, and for a scene
-        without any method. For a method that a rule selected, it is true only if the call or the
-        scene's file gives settings of this method, and the settings do not fit the scene.
+    is_asked : whether the user asked for the run. It is true if the method is named, if `method` is
+        "", and if the method refused the scene only when its solver was built. For a method that a
+        rule selected and `supporting_methods` refuses, it is true only if the call or the scene's
+        file gives settings of this method, and the settings do not fit the scene.
     """
 
     scene: str
@@ -302,7 +303,7 @@ def recommend(scene: Scene, defaults: tuple[str, ...]) -> tuple[tuple[str, ...],
     Raises
     ------
     MethodRefusal
-        If the mass matrix is or must become singular. The message has the reason.
+        If the mass matrix is or may become singular. The message has the reason.
     """
     reason = singular_reason(scene)
     if reason:
@@ -377,10 +378,11 @@ def fastest_rates(scene: Scene) -> tuple[float, float]:
 
 
 def singular_reason(scene: Scene) -> str:
-    """Return why the mass matrix of a scene is or must become singular; "" if it does not.
+    """Return why the mass matrix of a scene is or may become singular; "" if no reason is found.
 
-    Only a rotor whose hub has no inertia can have a singular mass matrix. Rotors with point-mass
-    blades are recognized; rotors with thin rods that point at the apex are not.
+    Only a rotor whose hub has no inertia can have a singular mass matrix. The function finds a
+    singular mass matrix if the blades are point masses, but not if the blades are thin rods that
+    point at the apex.
 
     Parameters
     ----------

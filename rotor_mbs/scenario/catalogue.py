@@ -237,9 +237,12 @@ def label_with_changes(name: str, changes: Iterable[SceneChange]) -> str:
 
 
 def moves_as_shipped(changes: Iterable[SceneChange] | None) -> bool:
-    """Return whether these `changes_from_shipped` concern at most the samples and the outputs.
+    """Return whether a scene moves as the shipped scene of the same name.
 
-    The scene then moves as the shipped scene. Returns False if `changes` is None.
+    Parameters
+    ----------
+    changes : the result of `changes_from_shipped` for the scene. The motion is the same if no key
+        but `samples` and `outputs` was changed. For None, the function returns False.
     """
     return changes is not None and all(change.path[0] in _NO_MOTION for change in changes)
 
