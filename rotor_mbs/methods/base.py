@@ -245,7 +245,7 @@ class Method:
     fallback : name of the method that replaces it if one of these packages is not installed; "" for
         none.
     order : order of convergence; None if it is not fixed.
-    fixed_step : whether the setting `step` is the step of the whole run.
+    fixed_step : whether all steps of a run have the same length, the setting `step`.
     ladders : series of settings used by `bench`.
     relative_cost : approximate run time, divided by that of the fastest method. With the duration
         of the scene it decides in which order runs start.
@@ -354,8 +354,8 @@ class Method:
                     # the value of the run from printed advice, which rounds to three digits.
                     if isinstance(current, int | float) and value < 0.99 * current:
                         lower[name] = value
-                # The first setting is the step or the relative tolerance. If it is not lower, the
-                # point is not finer.
+                # The first setting is the step, the only tolerance or the relative tolerance. If
+                # it is not lower, the point is not finer.
                 first_setting = next(iter(finer))
                 if first_setting in lower:
                     return lower

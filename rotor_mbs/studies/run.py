@@ -75,10 +75,12 @@ class RunTask(Task):
         """Solve and judge the run, and return its row.
 
         A shipped reference is read instead of computed. An error that the method raises becomes the
-        status of the run; only the errors below are raised.
+        status of the run, except for MethodRefusal and SYSTEM_ERRORS.
 
         Raises
         ------
+        StoreError
+            If the file of the shipped reference cannot be read.
         MethodRefusal
             If the method cannot represent the scene.
         Exception
