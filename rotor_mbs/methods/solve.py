@@ -57,8 +57,8 @@ def solve(
     MethodRefusal
         If the method cannot represent the scene.
     OutOfTimeError
-        If the time limit is reached, and the method cannot return the samples up to then, or not
-        soon enough.
+        If the time limit is reached, and the method cannot return the samples up to then or takes
+        too long to return them.
     RotorError
         If the method returns objects of wrong types, or arrays of a wrong shape.
     Exception

@@ -140,7 +140,7 @@ def run_tasks(pool: TaskPool, tasks: Iterable[T]) -> Iterator[TaskEnd[T, Rows]]:
     Parameters
     ----------
     pool : a pool that is open.
-    tasks : the tasks; further ones are taken as workers become free.
+    tasks : the tasks; the next one is taken from the iterable when a worker becomes free.
 
     Yields
     ------
