@@ -193,7 +193,7 @@ def checksums(first: int, rows: Rows, row_type: np.dtype[np.void]) -> NDArray[np
     first : initial value of the first row's checksum, see `RowLocation`. It increases by 1 from row
         to row.
     rows : columns of the rows.
-    row_type : type of a row, in the order of the checksum.
+    row_type : type of a row; its columns are in the order in which the checksum covers them.
     """
     # Each row has its own initial value, so that a row that was written at the location of another
     # row is detected.

@@ -287,7 +287,7 @@ class TableFile:
         return other
 
     def _check_runs(self) -> None:
-        """Raise StoreError if a row of /runs has a wrong label, or its scene has no row for it."""
+        """Raise StoreError if a run in /runs has a wrong label, or no row in its scene's table."""
         rows = self.tables[RUNS].known_rows if RUNS in self.tables else {}
         for run, row in rows.items():
             scene, method = row["scene"], row["method_name"]
