@@ -152,8 +152,9 @@ class DataComparison:
         subtracted, and the rest is divided by a factor for long intervals and error growth. For a
         load or a frequency it is the largest relative error, less three times the effect of
         rounding. `floor` is the largest estimated effect of rounding on a defect or relative error,
-        not multiplied by three. The unit of `defect` and `floor` is `defect_unit`. Each column `within LEVEL up to` has the time (s) up to which the
-        errors stay within the level; for modes the speed (rad/s).
+        not multiplied by three. The unit of `defect` and `floor` is `defect_unit`. Each column
+        `within LEVEL up to` has the time (s) up to which the errors stay within the level; for
+        modes the speed (rad/s).
         """
         rows = []
         for channel in self.verdict.channels:

@@ -60,9 +60,11 @@ LOAD_NAMES = tuple(load.name.replace("_", " ") for load in LOADS)
 FRAMES = {"blade": ("coned", "rotor", "shaft", "base"), "base": ("shaft", "rotor")}
 LOAD_FRAMES = ("blade", *FRAMES["blade"])
 _FRAME_ENDINGS = [[frame, "frame"] for frame in LOAD_FRAMES]
-# Root loads of OpenFAST, which the blade exerts on the hub. OpenFAST's x axis is along the shaft, z
-# along the blade, and y against the rotor's sense of rotation. The axes "b" turn with the pitch,
-# the axes "c" do not.
+# `_OPENFAST` matches the names of OpenFAST's root loads. `_OPENFAST_AXES` has, for each axis of
+# OpenFAST, the axis of the scene and the sign of the load. In OpenFAST the blade exerts the root
+# load on the hub, in the scene the hub exerts it on the blade. OpenFAST's x axis is along the
+# shaft, z along the blade, and y against the rotor's sense of rotation. The axes "b" turn with the
+# pitch, the axes "c" do not.
 _OPENFAST = re.compile(r"root([fm])([xyz])([bc])(\d+)", re.IGNORECASE)
 _OPENFAST_AXES = {"x": ("y", -1), "y": ("x", 1), "z": ("z", -1)}
 _UNIT_ENDING = re.compile(
@@ -213,8 +215,8 @@ class Entry(NamedTuple):
     ----------
     key : the name with a mark in place of the numbers. All columns of an array have the same key.
     numbers : the numbers.
-    start, end : positions in the name without its unit at which the numbers start and end. Square
-        brackets around the numbers are included.
+    start, end : positions at which the numbers start and end. They are positions in the name
+        without its unit. Square brackets around the numbers are included.
     """
 
     key: str
@@ -379,9 +381,10 @@ def arrays_of_other_length(
 
 
 def _load_arrays(channel: Channel) -> tuple[str, ...]:
-    """Return the names of arrays of which a load's component may be a column.
+    """Return the names of the two arrays that may have a load's component as a column.
 
-    There are two names: that of an array of all blades, and that of an array of one blade.
+    The first name is that of an array with the load of all blades. The second name is that of an
+    array with the load of one blade.
     """
     if not channel.is_load:
         return ()
@@ -448,10 +451,10 @@ def _channel_of_path(
     channel = _angle_or_rate(letters, numbers, known)
     if channel is None or entry is None:
         return channel
-    # The columns of two kinds of arrays are not identified: of an array of several rotor angles,
-    # because they are the azimuths of the blades; and of an array of more pitches than blades,
-    # because its first column may be the rotor. A pitch whose number has no brackets, as in
-    # "pitch_2", is identified: the number is the blade's.
+    # The columns of two kinds of arrays are not identified. The columns of an array of several rotor
+    # angles are the azimuths of the blades. If an array has more pitches than there are blades, its
+    # first column may be the rotor. A pitch whose number has no brackets, as in "pitch_2", is
+    # identified in any case: the number is the blade's.
     blades = sum(other.kind == "angle" for other in known) - 1
     allowed = 1 if channel.name.startswith("rotor") else blades
     return (
@@ -524,7 +527,10 @@ def _openfast_load(match: re.Match[str], known: Sequence[Channel]) -> Channel | 
 def _array_channel(
     array: str, indices: Sequence[int], vector: int, known: Sequence[Channel]
 ) -> Channel | None:
-    """Return the channel of an array's column, None if the array has another name or length.
+    """Return the channel of an array's column.
+
+    The result is None if no array of channels has this name, or if the array should have another
+    number of columns.
 
     Parameters
     ----------

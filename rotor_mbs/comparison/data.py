@@ -37,8 +37,7 @@ from rotor_mbs.solution.trajectory import Array
 _FEW_DIGITS, _SURE_DIGITS, _ALL_DIGITS = 9, 14, 17
 # At most about this many numbers of a column, evenly spaced, are formatted as text: 1 us each.
 _MAX_WRITTEN = 20_000
-# Largest relative error of a number that was rounded to few digits and then converted to another
-# unit. The conversion causes this error.
+# Largest relative error that a unit conversion adds to a number that was rounded before.
 _ROUNDED_SINCE = 2.0 * 2.0**-52
 _SINGLE_DIGITS = 8  # numbers with fewer significant digits are not called single precision
 _SINGLE = 2.0**-24  # relative rounding error of single precision

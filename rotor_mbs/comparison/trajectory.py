@@ -58,8 +58,8 @@ from rotor_mbs.solution.trajectory import Array, Trajectory
 _TIME_ROUNDING = 1e-9
 _MIN_ROWS = 3  # fewer rows are too few to be compared
 _STAGES = 4  # number of stages: reference, interval defects, search for causes, loads
-# If the data agree, a mistake counts as a cause only if the error that it leaves is at most this
-# share of the largest error.
+# If the data agree, a mistake counts as a cause only if its correction reduces the largest error
+# per unit of error growth to at most this share.
 _LEFT_OF_SMALL_ERRORS = 0.02
 # Largest number of references that are kept for further data of the same scene and times, and
 # largest number of rows of each. With three blades, all kept references together take up to some
@@ -150,9 +150,10 @@ def compare_with_reference(
 ) -> tuple[DataVerdict, Record]:
     """Compare a trajectory with the reference of a scene.
 
-    The first row, the defects of all intervals and the errors up to the horizon are judged, each
-    beyond the rounding of its channel. Then likely causes of the differences are searched for. The
-    search includes data that agree, because their small defects may be systematic.
+    The error of the first row, the defects of all intervals and the errors up to the horizon are
+    judged. The part of each that the rounding of the data explains is left out. Then likely causes
+    of the differences are searched for. The search includes data that agree, because their small
+    defects may be systematic.
 
     Parameters
     ----------
@@ -397,9 +398,9 @@ def _errors_of(
         predicted = float(np.abs(rows.defects.predicted[: rows.until]).max())
     sums = _largest_sums(scene, rows.defects)
     beyond_digits = _beyond_digits(scene, tolerance, rows.defects)
-    # Errors divided by the error growth reveal faults that the defects do not: faults below the
-    # tolerance in each interval that add up. An error that has only grown from a small error of the
-    # initial state remains small after the division.
+    # Errors divided by the error growth reveal faults that the defects do not reveal. In each
+    # interval such a fault is below the tolerance, but over many intervals it adds up. An error that
+    # has only grown from a small error of the initial state remains small after the division.
     exact = rows.exact
     carried = carried_errors(exact.trajectory, exact.growth, exact.units)
     carried = carried[rows.places][:, data.columns]
