@@ -451,10 +451,10 @@ def _channel_of_path(
     channel = _angle_or_rate(letters, numbers, known)
     if channel is None or entry is None:
         return channel
-    # The columns of two kinds of arrays are not identified. The columns of an array of several rotor
-    # angles are the azimuths of the blades. If an array has more pitches than there are blades, its
-    # first column may be the rotor. A pitch whose number has no brackets, as in "pitch_2", is
-    # identified in any case: the number is the blade's.
+    # The columns of two kinds of arrays are not identified. The columns of an array of several
+    # rotor angles are the azimuths of the blades. If an array has more pitches than there are
+    # blades, its first column may be the rotor. A pitch whose number has no brackets, as in
+    # "pitch_2", is identified in any case: the number is the blade's.
     blades = sum(other.kind == "angle" for other in known) - 1
     allowed = 1 if channel.name.startswith("rotor") else blades
     return (

@@ -24,8 +24,8 @@ SAME_START = 1e-3  # rad, rad/s: a first row and an initial state that differ by
 def carried_errors(reference: Trajectory, growth: Array, units: Array) -> Array:
     """Return the size to which a relative error of 1 in the initial state may have grown.
 
-    A relative error of 1 is as large as the largest angle of the reference up to the row in
-    question, and at least 1 rad.
+    For each row, a relative error of 1 is an error that is as large as the largest angle of the
+    reference up to this row, but at least 1 rad.
 
     Parameters
     ----------

@@ -140,8 +140,8 @@ def rounding_of_steps(time: Array) -> Array | None:
 
     Times with equal intervals are taken as exact to double precision, even if they have few digits.
     If a few intervals differ from the others, they are taken as mistakes in the times, not as
-    rounding. A program may compute its times by adding a step repeatedly. Their rounding is then
-    that of the additions, and the digits of a time do not show it.
+    rounding. A program may compute its times by adding a step repeatedly. The rounding of these
+    times is that of the additions, and the digits of a time do not show it.
 
     Parameters
     ----------

@@ -399,8 +399,8 @@ def _errors_of(
     sums = _largest_sums(scene, rows.defects)
     beyond_digits = _beyond_digits(scene, tolerance, rows.defects)
     # Errors divided by the error growth reveal faults that the defects do not reveal. In each
-    # interval such a fault is below the tolerance, but over many intervals it adds up. An error that
-    # has only grown from a small error of the initial state remains small after the division.
+    # interval such a fault is below the tolerance, but over many intervals it adds up. An error
+    # that has only grown from a small error of the initial state remains small after the division.
     exact = rows.exact
     carried = carried_errors(exact.trajectory, exact.growth, exact.units)
     carried = carried[rows.places][:, data.columns]

@@ -67,7 +67,7 @@ class DataVerdict:
 
     Attributes
     ----------
-    source : name of the file.
+    source : name of the file; "data" for arrays.
     status, message : "ok" or another status of a run; one line on why it is not "ok".
     tolerance : largest allowed `defect` of a channel, in the unit of `defect`.
     rows, compared_until, horizon_s : number of rows that are compared; time of the last of these
