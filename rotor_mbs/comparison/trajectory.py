@@ -114,6 +114,8 @@ class TrajectoryErrors:
     Attributes
     ----------
     channels : largest error and defect of each channel.
+    defect_times : s, end of the interval with the largest defect of each channel; None if its
+        defects are unknown.
     error : (rows, channels) magnitudes of the errors against the reference, rad and rad/s.
     per_growth : (rows, channels) `error` divided by `carried_errors`, the size to which a relative
         error of 1 at the start may have grown.
@@ -128,6 +130,7 @@ class TrajectoryErrors:
     """
 
     channels: tuple[ChannelErrors, ...]
+    defect_times: tuple[float | None, ...]
     error: Array
     per_growth: Array
     excess_per_growth: Array
@@ -406,8 +409,10 @@ def _errors_of(
     carried = carried[rows.places][:, data.columns]
     excess = np.maximum(error - FLOOR_SAFETY * rows.rounding, 0.0)
     missing = [label for i, label in enumerate(scene.coordinate_labels) if i not in data.columns]
+    channels, defect_times = _channel_errors(scene, rows, error)
     return TrajectoryErrors(
-        channels=_channel_errors(scene, rows, error),
+        channels=channels,
+        defect_times=defect_times,
         error=error,
         per_growth=error / carried,
         excess_per_growth=(excess / carried)[: rows.until].max(axis=0),
@@ -420,8 +425,12 @@ def _errors_of(
     )
 
 
-def _channel_errors(scene: Scene, rows: ReferencedRows, error: Array) -> tuple[ChannelErrors, ...]:
-    """Return the largest error and defect of each channel.
+def _channel_errors(
+    scene: Scene, rows: ReferencedRows, error: Array
+) -> tuple[tuple[ChannelErrors, ...], tuple[float | None, ...]]:
+    """Return the largest error and defect of each channel, and the time of each largest defect.
+
+    The time is the end of the interval in s; None if the defects of the channel are unknown.
 
     Parameters
     ----------
@@ -429,9 +438,9 @@ def _channel_errors(scene: Scene, rows: ReferencedRows, error: Array) -> tuple[C
     rows : the data with their reference.
     error : (rows, channels) absolute errors, rad and rad/s.
     """
-    channels = []
+    channels, times = [], []
     for j, channel in enumerate(rows.compared.channels):
-        defect = floor = None
+        defect = floor = time = None
         known = defects_of_channel(scene, rows.defects, channel)
         if known is not None and rows.defects is not None and rows.defects.is_resolved.any():
             sizes, floors = known
@@ -439,7 +448,9 @@ def _channel_errors(scene: Scene, rows: ReferencedRows, error: Array) -> tuple[C
             # length of an interval and with the error growth over the interval.
             beyond_rounding = np.maximum(sizes - FLOOR_SAFETY * floors, 0.0)
             excess = rows.defects.in_bound_units(beyond_rounding)
-            defect = float(excess[rows.defects.is_resolved].max())
+            resolved = np.where(rows.defects.is_resolved, excess, 0.0)
+            largest = int(resolved.argmax())
+            defect, time = float(resolved[largest]), float(rows.defects.time[1 + largest])
             floor = float(floors[rows.defects.is_resolved].max())
         channels.append(
             ChannelErrors(
@@ -452,7 +463,8 @@ def _channel_errors(scene: Scene, rows: ReferencedRows, error: Array) -> tuple[C
                 agrees_until=agrees_until(rows.reference.time, error[:, j]),
             )
         )
-    return tuple(channels)
+        times.append(time)
+    return tuple(channels), tuple(times)
 
 
 def _largest_interval(defects: Defects) -> int:
@@ -571,12 +583,16 @@ def _wrong_defects(tolerance: float, errors: TrajectoryErrors) -> Iterator[tuple
     errors : errors and defects of the data.
     """
     # The comparisons are written with `not`, so that a NaN counts as too large.
-    known = [channel for channel in errors.channels if channel.defect is not None]
-    for channel in sorted(known, key=lambda channel: -(channel.defect or 0.0)):
-        if not (channel.defect or 0.0) <= tolerance:
-            size = f"defect of {channel.defect:.1e} rad beyond rounding"
-            interval = f"in the interval up to t = {errors.defect_time:.6g} s"
-            yield "inaccurate", f"{channel.name}: {size}, {interval}, allowed {tolerance:.0e}"
+    known = [
+        (channel.defect, channel.name, time)
+        for channel, time in zip(errors.channels, errors.defect_times, strict=True)
+        if channel.defect is not None and time is not None
+    ]
+    for defect, name, time in sorted(known, key=lambda entry: -entry[0]):
+        if not defect <= tolerance:
+            size = f"defect of {defect:.1e} rad beyond rounding"
+            interval = f"in the interval up to t = {time:.6g} s"
+            yield "inaccurate", f"{name}: {size}, {interval}, allowed {tolerance:.0e}"
     if not errors.drift <= tolerance:
         size = f"defect of {errors.drift:.1e} rad beyond rounding"
         yield "inaccurate", f"{errors.drifting}: {size}, allowed {tolerance:.0e}"

@@ -313,3 +313,17 @@ def test_settled_angles_of_few_decimals_are_right_and_have_no_cause() -> None:
     assert found.verdict.notes == ("numbers of 4 decimals: rounding error 5e-05",)
     nothing = rm.compare({"time": run.time, "angles": 0.0 * run.angles}, scene)
     assert not any("numbers of" in note for note in nothing.verdict.notes)
+
+
+def test_the_interval_that_is_named_is_that_of_the_channel() -> None:
+    """Of a pitch that is ahead by more and more, the fitted rates have their largest defect 0.6 s
+    before the pitch has its own."""
+    run = rm.run("paper/fig11", "lagrange/taylor")
+    time, angles = np.array(run.time), np.array(run.angles)
+    late = time > 5.0
+    angles[late, 2] += 1e-3 * (time[late] - 5.0)
+    comparison = rm.compare({"time": time, "angles": angles}, "paper/fig11")
+    defects = comparison.to_xarray()["pitch_2_defect"].to_numpy()
+    end = time[np.nanargmax(defects)]
+    assert comparison.message.startswith("pitch 2: defect of")
+    assert f"in the interval up to t = {end:.6g} s" in comparison.message
