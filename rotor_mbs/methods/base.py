@@ -354,8 +354,8 @@ class Method:
                     # the value of the run from printed advice, which rounds to three digits.
                     if isinstance(current, int | float) and value < 0.99 * current:
                         lower[name] = value
-                # The first setting is the step, the only tolerance or the relative tolerance. If
-                # it is not lower, the point is not finer.
+                # The first setting is the one that limits the accuracy: the step, the only
+                # tolerance, or the larger one of two. If it is not lower, the point is not finer.
                 first_setting = next(iter(finer))
                 if first_setting in lower:
                     return lower

@@ -15,7 +15,13 @@ from support.runs import run
 from support.scenes import shipped
 
 from rotor_mbs.analysis.judgement import judge
-from rotor_mbs.methods.catalogue import REFERENCE, default_method, find_method
+from rotor_mbs.methods.catalogue import (
+    REFERENCE,
+    default_methods,
+    find_method,
+    is_corrected,
+    method_names,
+)
 from rotor_mbs.methods.solve import solve
 from rotor_mbs.solution.metrics import metrics_of
 from rotor_mbs.studies.run import next_to_try
@@ -71,14 +77,21 @@ def test_loads_of_a_stiff_bearing_are_known_to_the_rounding_of_its_angle(
     assert next_to_try(scene, REFERENCE, {}, "inaccurate") == ""
 
 
-def test_a_run_with_the_finest_settings_is_referred_to_another_method() -> None:
-    scene, method = shipped("turbine/steady"), find_method("exudyn_tree/rk67")
+@pytest.mark.parametrize(
+    "name",
+    [name for name in method_names() if find_method(name).ladders and is_corrected(name)],
+)
+def test_a_run_with_the_finest_settings_is_referred_to_another_method(name: str) -> None:
+    scene, method = shipped("turbine/steady"), find_method(name)
     interval = scene.duration / (scene.samples - 1)
     *_, finer, finest = method.ladders[0].settings_by_value(interval).values()
     advice = next_to_try(scene, method.name, {**method.defaults, **finer}, "inaccurate")
-    assert advice == f"; next to try: step={finest['step']:.3g}"
+    lower = {key: value for key, value in finest.items() if value != finer[key]}
+    shown = ", ".join(f"{key}={value:.3g}" for key, value in lower.items())
+    assert lower
+    assert advice == f"; next to try: {shown}"
     advice = next_to_try(scene, method.name, {**method.defaults, **finest}, "inaccurate")
-    other = default_method()
+    other = next(name for name in default_methods() if name != method.name and is_corrected(name))
     assert advice == f"; no finer settings of this method are known; next to try: {other}"
 
 

@@ -98,7 +98,7 @@ METHODS = (
         settings=schemes.Dopri5Settings,
         ladders=(
             tolerance_ladder(
-                lambda tol: {"relative_tolerance": 0.0, "absolute_tolerance": tol},
+                lambda tol: {"absolute_tolerance": tol, "relative_tolerance": 0.0},
                 1e-2,
                 1e-4,
                 1e-6,
