@@ -203,8 +203,11 @@ def _signal_main_thread(number: signal.Signals) -> None:
 
     Except on Windows, the signal also ends a system call of that thread early, such as a sleep.
     """
-    if not callable(signal.getsignal(number)):
-        return  # the command has ended and its handler is removed: the signal would end the process
+    handler = signal.getsignal(number)
+    if not callable(handler) or handler is signal.default_int_handler:
+        # The command has ended, and its handler is removed. The signal would end the process, or
+        # interrupt what the caller of the command does next.
+        return
     if hasattr(signal, "pthread_kill"):
         main_thread_id = threading.main_thread().ident
         assert main_thread_id is not None  # None only before a thread starts

@@ -22,7 +22,7 @@ from support.stored import Made, rotor, store
 from support.sweeps import THREE_RUNS
 
 from rotor_mbs.analysis.text_tables import table_of_runs
-from rotor_mbs.errors import MethodRefusal
+from rotor_mbs.errors import InputError, MethodRefusal
 from rotor_mbs.runs.progress import ProgressLine, coloured
 from rotor_mbs.runs.read import open_results
 from rotor_mbs.runs.runner import RunOutcome
@@ -122,6 +122,22 @@ def test_an_interrupt_where_python_ignores_exceptions_comes_again(
         return []
 
     assert _ends_by(monkeypatch, interrupted)[0] == 130
+
+
+def test_an_interrupt_that_comes_again_after_the_command_leaves_its_caller_alone(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    class Interrupted:
+        def __del__(self) -> None:
+            raise KeyboardInterrupt
+
+    def interrupted() -> list[object]:
+        Interrupted()
+        raise InputError("no such scene")
+
+    status, errors = _ends_by(monkeypatch, interrupted)
+    time.sleep(0.1)  # the interrupt comes again after 10 ms
+    assert (status, errors) == (2, "no such scene\n")
 
 
 @pytest.mark.parametrize(("words", "status"), [(("list",), 0), (("new", "mine.toml"), 1)])
