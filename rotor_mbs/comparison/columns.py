@@ -69,8 +69,8 @@ class DataTable:
     left_out : for each other part of the file, by its name, the reason why it is not read as a
         column of numbers.
     program : "openfast" if the head of the file says that OpenFAST wrote it, otherwise "".
-    headers : the names in the file of renamed columns, by the new name. A column is renamed if an
-        earlier column has the same name.
+    headers : for each renamed column, by its new name, its name in the file. A column is renamed if
+        an earlier column has the same name.
     """
 
     source: str
@@ -165,8 +165,8 @@ def table_of(
 
     A two-dimensional array (n, k) becomes the columns `name[0]` ... `name[k-1]`; a
     three-dimensional array (n, j, k) becomes the columns `name[0,0]` ... `name[j-1,k-1]`. An array
-    of shape (k, n) is transposed if there are one-dimensional arrays of length n: MATLAB's arrays
-    have this shape in HDF5. Values that are no numbers, single numbers, empty arrays, and arrays of
+    of shape (k, n) is transposed if n, but not k, is the length of the longest one-dimensional
+    array: MATLAB's arrays have this shape in HDF5. Values that are no numbers, single numbers, empty arrays, and arrays of
     more dimensions are put into `left_out`.
 
     Parameters
@@ -179,7 +179,8 @@ def table_of(
     Raises
     ------
     InputError
-        If there are no columns of numbers, or more than `MAX_COLUMNS`.
+        If there are no columns of numbers; if the columns of an array of two or three dimensions
+        make more than `MAX_COLUMNS` in all.
     """
     numeric: dict[str, NDArray[Any]] = {}
     left_out: dict[str, LeftOut] = {}

@@ -27,13 +27,12 @@ from rotor_mbs.scenario.keys import counted
 from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.trajectory import Array
 
-# Numbers of significant digits. Whether numbers have a given number of digits is tested by
-# arithmetic up to _FEW_DIGITS digits, and by formatting them as text for more digits. A number
-# passes the test by text if its relative difference from the number in the text is at most
-# _ROUNDED_SINCE. This difference is allowed up to _SURE_DIGITS digits. For more digits, the number
-# and the number in the text must be equal: the rounding to so many digits is hardly larger than
-# _ROUNDED_SINCE. If this difference were allowed, numbers that are not rounded would pass, too (a
-# third of them at 15 digits, nearly all at 16). No double needs more than _ALL_DIGITS.
+# Bounds of the test whether numbers have a given number of significant digits. Up to _FEW_DIGITS
+# digits, the test is by arithmetic. For more digits, each number is formatted as text and compared
+# with the number in the text. Up to _SURE_DIGITS digits, the two may differ by _ROUNDED_SINCE
+# (relative). For more digits, they must be equal: the rounding to so many digits is hardly larger
+# than _ROUNDED_SINCE. If this difference were allowed, numbers that are not rounded would pass, too
+# (a third of them at 15 digits, nearly all at 16). No double needs more than _ALL_DIGITS.
 _FEW_DIGITS, _SURE_DIGITS, _ALL_DIGITS = 9, 14, 17
 # At most about this many numbers of a column, evenly spaced, are formatted as text: 1 us each.
 _MAX_WRITTEN = 20_000
@@ -65,10 +64,9 @@ class ForeignData:
         precision, or as sums of a step in double precision, see `rounding_of_steps`.
     read : a line for each channel: column, unit, and what was assumed. For OpenFAST's output, the
         first line says how its columns are read.
-    unused : for every column or part of a file that is no channel, by its name, the reason why it
-        is not compared.
-    loads_left_out : names of the loads that are in unused columns although the mapping does not
-        omit them.
+    unused : for every column or part of a file that is not compared, by its name, the reason.
+    loads_left_out : names of the loads that are not compared only because the mapping's `only` does
+        not contain them.
     wrapped : for each channel, whether the file has the angle without its whole turns.
     precision : precision of the numbers in words, as a number of decimals ("4 decimals: rounding
         error 5e-05"), as a number of digits, or as single precision; "" if the numbers have hardly
