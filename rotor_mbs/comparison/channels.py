@@ -103,7 +103,11 @@ class Channel:
 
     @property
     def key(self) -> str:
-        """Return the key of the channel in a mapping file: "pitch_1_rate"."""
+        """Return the key of the channel: "pitch_1_rate".
+
+        It is the key in a mapping file, except for a load in another frame than the scene's: its
+        key ends with the frame, but keys in mapping files have no frame.
+        """
         return channel_key(self.name)
 
     @property
@@ -451,9 +455,9 @@ def _channel_of_path(
     channel = _angle_or_rate(letters, numbers, known)
     if channel is None or entry is None:
         return channel
-    # The columns of two kinds of arrays are not identified. The columns of an array of several
-    # rotor angles are the azimuths of the blades. If an array has more pitches than there are
-    # blades, its first column may be the rotor. A pitch whose number has no brackets, as in
+    # Two kinds of arrays are not identified: an array of several rotor angles, because its columns
+    # are the azimuths of the blades; and an array with more pitches than there are blades, because
+    # its first column may be the rotor. A pitch whose number has no brackets, as in
     # "pitch_2", is identified in any case: the number is the blade's.
     blades = sum(other.kind == "angle" for other in known) - 1
     allowed = 1 if channel.name.startswith("rotor") else blades

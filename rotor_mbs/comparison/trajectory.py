@@ -58,8 +58,8 @@ from rotor_mbs.solution.trajectory import Array, Trajectory
 _TIME_ROUNDING = 1e-9
 _MIN_ROWS = 3  # fewer rows are too few to be compared
 _STAGES = 4  # number of stages: reference, interval defects, search for causes, loads
-# If the data agree, a mistake counts as a cause only if its correction reduces the largest error
-# per unit of error growth to at most this share.
+# If the data agree, a mistake counts as a cause only if its correction leaves at most this share of
+# the largest error per unit of error growth.
 _LEFT_OF_SMALL_ERRORS = 0.02
 # Largest number of references that are kept for further data of the same scene and times, and
 # largest number of rows of each. With three blades, all kept references together take up to some
