@@ -24,8 +24,9 @@ SAME_START = 1e-3  # rad, rad/s: a first row and an initial state that differ by
 def carried_errors(reference: Trajectory, growth: Array, units: Array) -> Array:
     """Return the size to which a relative error of 1 in the initial state may have grown.
 
-    For each row, a relative error of 1 is an error that is as large as the largest angle of the
-    reference up to this row, but at least 1 rad.
+    For each row, the initial state is assumed to have an error as large as the largest angle of the
+    reference up to this row, but at least 1 rad. The result is this error, multiplied by the
+    largest error growth up to this row.
 
     Parameters
     ----------
@@ -160,8 +161,8 @@ def judged_defects(
     units = np.concatenate([np.ones(len(moving)), defects.rate_units[moving]])
     values = vectors / units
     # The estimated rounding of a number near zero is much smaller than that of its neighbours. A
-    # small defect at such a number would look large compared with this estimate. Therefore floors
-    # have a lower limit, a share of the channel's median.
+    # small defect at such a number would look large compared with this estimate. Therefore each
+    # floor has a lower limit: a share of the median of its channel's floors.
     floors = np.maximum(defects.floors, 0.3 * np.median(defects.floors, axis=0) + 1e-18)
     is_judged = defects.is_resolved & np.isfinite(vectors).all(axis=1)
     sizes = np.abs(np.where(is_judged[:, None], values, 0.0))
