@@ -166,8 +166,8 @@ def table_of(
     A two-dimensional array (n, k) becomes the columns `name[0]` ... `name[k-1]`; a
     three-dimensional array (n, j, k) becomes the columns `name[0,0]` ... `name[j-1,k-1]`. An array
     of shape (k, n) is transposed if n, but not k, is the length of the longest one-dimensional
-    array: MATLAB's arrays have this shape in HDF5. Values that are no numbers, single numbers, empty arrays, and arrays of
-    more dimensions are put into `left_out`.
+    array: MATLAB's arrays have this shape in HDF5. Values that are no numbers, single numbers,
+    empty arrays, and arrays of more dimensions are put into `left_out`.
 
     Parameters
     ----------
