@@ -28,11 +28,12 @@ from rotor_mbs.scenario.scene import Scene
 from rotor_mbs.solution.trajectory import Array
 
 # Bounds of the test whether numbers have a given number of significant digits. Up to _FEW_DIGITS
-# digits, the test is by arithmetic. For more digits, each number is formatted as text and compared
-# with the number in the text. Up to _SURE_DIGITS digits, the two may differ by _ROUNDED_SINCE
-# (relative). For more digits, they must be equal: the rounding to so many digits is hardly larger
-# than _ROUNDED_SINCE. If this difference were allowed, numbers that are not rounded would pass, too
-# (a third of them at 15 digits, nearly all at 16). No double needs more than _ALL_DIGITS.
+# digits, the test is by arithmetic. For more digits, numbers are formatted as text, and each is
+# compared with the number in its text. Up to _SURE_DIGITS digits, the two may differ by
+# _ROUNDED_SINCE (relative). For more digits, they must be equal: the rounding to so many digits is
+# hardly larger than _ROUNDED_SINCE. If this difference were allowed, numbers that are not rounded
+# would pass, too (a third of them at 15 digits, nearly all at 16). No double needs more than
+# _ALL_DIGITS.
 _FEW_DIGITS, _SURE_DIGITS, _ALL_DIGITS = 9, 14, 17
 # At most about this many numbers of a column, evenly spaced, are formatted as text: 1 us each.
 _MAX_WRITTEN = 20_000
