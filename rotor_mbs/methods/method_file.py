@@ -15,7 +15,7 @@ import traceback
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, redirect_stderr, redirect_stdout, suppress
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
@@ -30,9 +30,9 @@ from rotor_mbs.methods.base import (
     step_ladder,
     tolerance_ladder,
 )
-from rotor_mbs.processes.worker import TaskLostError, Worker, memory_limit_text
 
 if TYPE_CHECKING:
+    from rotor_mbs.processes.worker import Worker
     from rotor_mbs.scenario.scene import Scene
 
 ENDING = ".py"
@@ -247,8 +247,17 @@ def read_file(path: str) -> MethodFile:
 
 # Only one thread at a time runs a file, because `quiet` redirects the output of the whole process.
 _loading = threading.Lock()
-_worker = Worker(is_silent=True)  # process in which files are tested; they may end or hang it
-atexit.register(_worker.close)
+
+
+@cache
+def _worker() -> Worker:
+    """Return the process in which files are tested; a file may end it, or never return."""
+    # Imported here, as most commands load no method file.
+    from rotor_mbs.processes.worker import Worker
+
+    worker = Worker(is_silent=True)
+    atexit.register(worker.close)
+    return worker
 
 
 def _ask(file: MethodFile, built: tuple[str, Scene] | None, late: str, ended: str) -> Any:
@@ -270,16 +279,19 @@ def _ask(file: MethodFile, built: tuple[str, Scene] | None, late: str, ended: st
     ResourceError
         If the process cannot be started.
     """
+    from rotor_mbs.processes.worker import TaskLostError, memory_limit_text
+
+    worker = _worker()
     try:
         try:
-            return _worker.run(_answer, (file, built), _LOAD_S)
+            return worker.run(_answer, (file, built), _LOAD_S)
         except InputError:
             if built is not None:
                 raise
         # The process may have loaded modules that the file imports before the user corrected them,
         # or have an old import path. A new process has neither.
-        _worker.end_process()
-        return _worker.run(_answer, (file, built), _LOAD_S)
+        worker.end_process()
+        return worker.run(_answer, (file, built), _LOAD_S)
     except TaskLostError as exc:
         if exc.exit_code is None:
             raise InputError(f"{late}{memory_limit_text()}") from None
