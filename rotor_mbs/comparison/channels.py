@@ -317,6 +317,11 @@ def channel_from_name(
     known : all channels that the data may have, by `channels` or `mode_channels`.
     indices : indices of the column in its array, see `Place`. By default they are the numbers in
         the name, counted from 0 if they are in square brackets, otherwise from 1.
+
+    Raises
+    ------
+    InputError
+        If the name means a load in a frame in which the load has no components.
     """
     stripped = name.strip().strip("\"'").strip()
     inner = _DERIVATIVE.fullmatch(split_unit(stripped)[0])

@@ -179,8 +179,8 @@ def table_of(
     Raises
     ------
     InputError
-        If there are no columns of numbers; if the columns of an array of two or three dimensions
-        make more than `MAX_COLUMNS` in all.
+        If there are no columns of numbers, or more than `MAX_COLUMNS`; if two columns have one
+        name, such as "q[0]" and the first column of an array "q".
     """
     numeric: dict[str, NDArray[Any]] = {}
     left_out: dict[str, LeftOut] = {}
@@ -216,17 +216,16 @@ def table_of(
             plain_name = name
         unit = stated.get(name, unit)
         step = (steps or {}).get(name, 0.0)
-        if values.ndim == 1:
-            columns[plain_name] = DataColumn(values.astype(float), unit, step)
-            continue
-        is_transposed = values.shape[-1] == rows != values.shape[0]
+        is_transposed = values.ndim > 1 and values.shape[-1] == rows != values.shape[0]
         oriented = values.T if is_transposed else values
         count = math.prod(oriented.shape[1:])
         if len(columns) + count > MAX_COLUMNS:
             problem = f"array {name[:_MAX_SHOWN_NAME]!r} has {count} columns"
             raise InputError(f"{source}: {problem}; allowed: up to {MAX_COLUMNS} in all")
         for place in np.ndindex(oriented.shape[1:]):
-            label = f"{plain_name}[{','.join(map(str, place))}]"
+            label = f"{plain_name}[{','.join(map(str, place))}]" if place else plain_name
+            if label in columns:  # "q[0]" beside an array "q"
+                raise InputError(f"{source}: two columns {label!r}; allowed: one of each name")
             columns[label] = DataColumn(oriented[:, *place].astype(float), unit, step)
     if not columns:
         allowed = "a time and angles, as columns or arrays"

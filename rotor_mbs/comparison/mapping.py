@@ -309,6 +309,11 @@ def _suggested(table: DataTable, known: Sequence[Channel]) -> list[tuple[Channel
     ----------
     table : the columns.
     known : all channels that the data may have.
+
+    Raises
+    ------
+    InputError
+        If a name means a load in a frame in which the load has no components.
     """
     # To recognize a name such as "q[2]", the number of columns of its array "q" must be known: an
     # array of angles has one column for each coordinate.
@@ -316,10 +321,11 @@ def _suggested(table: DataTable, known: Sequence[Channel]) -> list[tuple[Channel
     suggested = []
     for name in table.columns:
         place = places.get(name)
-        if place is None:
-            channel = channel_from_name(name, 0, known)
-        else:
-            channel = channel_from_name(name, place.columns, known, place.indices)
+        columns, indices = (place.columns, place.indices) if place else (0, None)
+        try:
+            channel = channel_from_name(name, columns, known, indices)
+        except InputError as exc:  # a load in a frame that it does not have
+            raise InputError(f"{table.source}: column {name!r}: {exc}") from None
         if channel is not None:
             suggested.append((channel, name))
     return suggested
@@ -350,13 +356,19 @@ def _sources(
     Raises
     ------
     InputError
-        If the names of two columns suggest one channel.
+        If the names of two columns suggest one channel, or the mapping gives a load a frame in
+        which the load has no components.
     """
     sources: dict[Channel, ColumnMapping] = {}
     for channel in known:
         mapped = mapping.columns.get(channel.key)
         if mapped is not None:
-            sources[channel.in_frame(mapped.frame) if mapped.frame else channel] = mapped
+            if mapped.frame:
+                try:
+                    channel = channel.in_frame(mapped.frame)
+                except InputError as exc:
+                    raise InputError(f"{table.source}: column {mapped.column!r}: {exc}") from None
+            sources[channel] = mapped
     mapped_columns = {mapped.column for mapped in sources.values()}
     reasons: dict[str, str] = {}
     loads_left_out: list[str] = []

@@ -275,6 +275,11 @@ WRONG: dict[str, tuple[Callable[[Path], object], str]] = {
         _write("time,rotor,azimuth\n0,1,1\n1,2,2\n2,3,3\n"),
         "could be rotor",
     ),
+    "a load in a frame that it does not have": (
+        _write("time,rotor,shaft force x blade frame\n0,1,1\n1,2,2\n2,3,3\n"),
+        "data.csv: column 'shaft force x blade frame': shaft_force_x: frame 'blade'; allowed: "
+        "base, shaft, rotor",
+    ),
     "a text that begins as JSON": (_write('{"time": [0, 1'), "allowed: text with a header"),
     "JSON of no arrays": (_write('{"time": {"a": 1}}'), "allowed: "),
     "Parquet": (
@@ -318,6 +323,14 @@ def test_wrong_input_is_one_line_and_status_2(tmp_path: Path, case: str) -> None
         ({"time": TIME, "angles": [[1.0, 2.0], [3.0]]}, "rows of different lengths"),
         ({"time": TIME[1:], "rotor": ANGLES[:, 0]}, "columns of different lengths"),
         ({"time": 3.0, "rotor": 2.0}, "no columns of numbers"),
+        (
+            {"time": TIME, "angles": ANGLES, "angles[0]": ANGLES[:, 1]},
+            r"two columns 'angles\[0\]'; allowed: one of each name",
+        ),
+        (
+            {"time": TIME, "angles[0]": ANGLES[:, 1], "angles": ANGLES},
+            r"two columns 'angles\[0\]'; allowed: one of each name",
+        ),
         (ANGLES, "data: ndarray; allowed: a file, or arrays by name, such as "),
     ],
 )
