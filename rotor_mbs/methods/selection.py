@@ -138,10 +138,11 @@ class Refusal:
     scene : name of the scene.
     method : name of the method; "" if the scene is left out with all methods.
     reason : why the run is left out, in one sentence.
-    is_asked : whether the user asked for the run. It is true if the method is named, if `method` is
-        "", and if the method refused the scene only when its solver was built. For a method that a
-        rule selected and `supporting_methods` refuses, it is true only if the call or the scene's
-        file gives settings of this method, and the settings do not fit the scene.
+    is_asked : whether the run counts as one that the user asked for. It is always true if the call
+        or the scene's file names the method, if `method` is "", or if the method refused the scene
+        only when its solver was built. If `supporting_methods` refuses a method that nobody named,
+        it is true only if the reason is that settings of the call or the scene's file do not fit
+        the scene.
     """
 
     scene: str

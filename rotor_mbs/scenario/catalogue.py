@@ -14,8 +14,8 @@ from rotor_mbs.scenario.toml_file import file_path, parse_toml, shown_path
 if TYPE_CHECKING:  # `rotor-mbs list` reads no scene
     from rotor_mbs.scenario.scene import Scene, SceneChange, ValuesCheck
 
-# Names of the groups at the top of a results file that are not scenes. No scene may have one of
-# these names.
+# Names that no scene may have. `bench` and `stability` are tables of points in a results file;
+# `modes` and `comparison` are groups in other files. The remaining names are not groups now.
 RESERVED_GROUPS = (
     "bench",
     "claims",
