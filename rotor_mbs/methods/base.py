@@ -350,12 +350,14 @@ class Method:
                 lower: dict[str, object] = {}
                 for name, value in finer.items():
                     current = settings[name]
-                    # A value that is lower by less than 1 % is not finer. The user may have copied
-                    # the value of the run from printed advice, which rounds to three digits.
+                    # A value that is lower by less than 1 % does not count as finer: the run may
+                    # have this value of the ladder already, rounded to three digits, if the user
+                    # copied it from printed advice (`studies.run.next_to_try`).
                     if isinstance(current, int | float) and value < 0.99 * current:
                         lower[name] = value
-                # The first setting is the one that limits the accuracy: the step, the only
-                # tolerance, or the larger one of two. If it is not lower, the point is not finer.
+                # The first setting of a point limits the accuracy: it is the step, the only
+                # tolerance, or the larger of two tolerances. If this setting is not lower than that
+                # of the run, the point is not finer than the run.
                 first_setting = next(iter(finer))
                 if first_setting in lower:
                     return lower

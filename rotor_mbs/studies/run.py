@@ -112,8 +112,9 @@ class RunTask(Task):
         if self.reference is not None:
             reference = read_reference(self.reference, request.scene)
         run, false_success = _judged(run, reference, end)
-        # If a shipped reference ends early because its own computation was stopped, the time limit
-        # of this call did not end it: NaN is stored.
+        # `time_limit_s` is the time limit of this call if this limit ended the run, otherwise NaN.
+        # It is also NaN for a shipped reference that ends early because its own computation was
+        # stopped before it was shipped.
         was_stopped_before = shipped is not None and shipped.integration.out_of_time
         is_over = run.status == "timed_out" and not was_stopped_before
         limit = self.time_limit_s if is_over else np.nan
