@@ -165,7 +165,10 @@ class StoredTable(TableSpec):
         return statuses
 
     def clear(self) -> None:
-        """Write blank values into this table of a new file, into all columns except the status."""
+        """Write blank values into all computed columns of this table except the status.
+
+        The file must be new: its layout already has the status MISSING in each row.
+        """
         with self.path.open("r+b") as file:
             for name, blank in blank_rows(1, self.row_type).items():
                 if name == "status":
@@ -178,8 +181,8 @@ class StoredTable(TableSpec):
     def place(self, row: int = 0) -> RowLocation:
         """Return the location of a row and of the rows after it.
 
-        The checksum of a row begins with the number of its run if runs are numbered, otherwise with
-        the number of the row.
+        The initial value of a row's checksum is the number of its run if runs are numbered,
+        otherwise the number of the row in the table.
 
         Parameters
         ----------
