@@ -30,12 +30,13 @@ from rotor_mbs.solution.trajectory import Array
 # Bounds of the test whether numbers have a given number of significant digits. Up to _FEW_DIGITS
 # digits, the test is by arithmetic. For more digits, numbers are formatted as text, and each is
 # compared with the number in its text. Up to _SURE_DIGITS digits, the two may differ by
-# _ROUNDED_SINCE (relative). For more digits, they must be equal: the rounding to so many digits is
-# hardly larger than _ROUNDED_SINCE. If this difference were allowed, numbers that are not rounded
-# would pass, too (a third of them at 15 digits, nearly all at 16). No double needs more than
-# _ALL_DIGITS.
+# _ROUNDED_SINCE (relative). For more digits, they must be equal. If a difference were allowed there,
+# numbers that are not rounded would pass, too (a third of them at 15 digits, nearly all at 16),
+# because the rounding to so many digits is hardly larger than _ROUNDED_SINCE. No double needs more
+# than _ALL_DIGITS.
 _FEW_DIGITS, _SURE_DIGITS, _ALL_DIGITS = 9, 14, 17
-# At most about this many numbers of a column, evenly spaced, are formatted as text: 1 us each.
+# At most about this many numbers of a column, evenly spaced, are formatted as text, because
+# formatting takes 1 us per number.
 _MAX_WRITTEN = 20_000
 # Largest relative error that a unit conversion adds to a number that was rounded before.
 _ROUNDED_SINCE = 2.0 * 2.0**-52
@@ -66,8 +67,8 @@ class ForeignData:
     read : a line for each channel: column, unit, and what was assumed. For OpenFAST's output, the
         first line says how its columns are read.
     unused : for every column or part of a file that is not compared, by its name, the reason.
-    loads_left_out : names of the loads that are not compared only because the mapping's `only` does
-        not contain them.
+    loads_left_out : names of the loads that the data have and the mapping's `only` does not
+        contain. They are not compared for this reason alone: the mapping does not omit them.
     wrapped : for each channel, whether the file has the angle without its whole turns.
     precision : precision of the numbers in words, as a number of decimals ("4 decimals: rounding
         error 5e-05"), as a number of digits, or as single precision; "" if the numbers have hardly
@@ -75,9 +76,10 @@ class ForeignData:
     time_precision : precision of the times in words. It is "" if the times have hardly any
         rounding, or if nearly all intervals are equal.
     notes : what was done to the rows, a line each.
-    omitted : names of the channels that the mapping omits: the data need not have them.
-    restricted_to : names of the channels to which the mapping restricts the comparison; empty if
-        there is no restriction.
+    omitted : names of the channels, loads and kinds of frequencies that the mapping omits: the data
+        need not have them.
+    restricted_to : names of the channels, loads and kinds of frequencies to which the mapping
+        restricts the comparison; empty if there is no restriction.
     is_modes : whether the data are a table of modes.
     """
 
@@ -503,8 +505,8 @@ def _have_digits(values: Array, digits: int) -> bool:
             rounded = np.round(values / unit) * unit
         return np.allclose(values, rounded, rtol=1e-12, atol=0.0)
     # For more digits the arithmetic above is too coarse. The numbers are formatted as text and
-    # compared with the text. A small difference is allowed, because the numbers may have been
-    # converted to another unit after they were rounded.
+    # compared with the text. Up to _SURE_DIGITS digits a small difference is allowed, because the
+    # numbers may have been converted to another unit after they were rounded.
     most = _ROUNDED_SINCE if digits <= _SURE_DIGITS else 0.0
     for value in values[:: 1 + len(values) // _MAX_WRITTEN].tolist():
         written = float(f"{value:.{digits - 1}e}")

@@ -75,9 +75,10 @@ class DataMapping:
     columns : the sources of channels, by the key of the channel. Other channels are recognized by
         the names of columns.
     group : group of an HDF5 file that is read, see `runs.arrays.read_arrays`.
-    omitted : names of channels that are not compared, and need not be in the data.
-    only : names of the channels to which the comparison is restricted, besides the time or speed;
-        empty if it is not restricted.
+    omitted : names of channels, loads and kinds of frequencies that are not compared, and need not
+        be in the data.
+    only : names of the channels, loads and kinds of frequencies to which the comparison is
+        restricted, besides the time or speed; empty if it is not restricted.
     program : "openfast" if the columns have the names, units, signs and frames of OpenFAST's
         output, otherwise "".
     openfast : numbers of the OpenFAST model that are needed to read its output.
