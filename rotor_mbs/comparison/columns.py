@@ -34,8 +34,8 @@ class DataColumn(NamedTuple):
     unit : the unit that the file states; "" if it states none.
     step : step between the numbers, in the same unit, if they are packed as integers; otherwise 0.
     missing : text for messages about the first missing number, with its row: "empty in row 2 of 9
-        (line 3)". It is "" if no number is missing. It is also "" if the data have NaN for missing
-        numbers when they are read, as arrays do.
+        (line 3)". It is "" if no number is missing. It is also "" if the source itself has NaN in
+        place of the missing numbers, as an array has.
     """
 
     values: NDArray[np.float64]
@@ -365,7 +365,8 @@ def _is_argument(text: str, end: int, stem: str, unit: str) -> bool:
     Parameters
     ----------
     text : a column's name.
-    end : position in `text` at which the bracket or stroke before the supposed unit begins.
+    end : position in `text` of the bracket or stroke before the supposed unit; for " / unit" that
+        of the blanks before the stroke.
     stem, unit : the text before this position, and the supposed unit.
     """
     if unit and all(character.isdigit() or character in ", " for character in unit):

@@ -54,7 +54,8 @@ from rotor_mbs.solution.metrics import horizon, horizon_samples
 from rotor_mbs.solution.status import OK_ERROR
 from rotor_mbs.solution.trajectory import Array, Trajectory
 
-# Times are rounded: a time that exceeds the duration by at most this share of it is inside.
+# Times are rounded. A row is compared even if its time exceeds the scene's duration, by at most this
+# share of the duration.
 _TIME_ROUNDING = 1e-9
 _MIN_ROWS = 3  # fewer rows are too few to be compared
 _STAGES = 4  # number of stages: reference, interval defects, search for causes, loads
