@@ -23,8 +23,9 @@ LEVELS = (1e-3, 1e-6, 1e-9)  # levels of error in rad, rad/s or relative, see `a
 # Largest allowed defect of an interval, rad; also the largest allowed error of a load relative to
 # its largest magnitude, and of a frequency relative to the frequency.
 DEFAULT_TOLERANCE = 1e-6
-# Largest number of unused columns that a results file lists, and largest length of their names and
-# reasons as JSON. They are stored in an attribute, which has at most 64 kB in HDF5.
+# Largest number of unused columns that a results file lists, and largest length of this list, of
+# names and reasons, as JSON text. The list is stored in an attribute, which has at most 64 kB in
+# HDF5.
 _MAX_NAMES, _MAX_NAME_BYTES = 100, 30_000
 
 
