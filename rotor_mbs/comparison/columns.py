@@ -34,8 +34,8 @@ class DataColumn(NamedTuple):
     unit : the unit that the file states; "" if it states none.
     step : step between the numbers, in the same unit, if they are packed as integers; otherwise 0.
     missing : text for messages about the first missing number, with its row: "empty in row 2 of 9
-        (line 3)". It is "" if no number is missing. It is also "" if the source itself has NaN in
-        place of the missing numbers, as an array has.
+        (line 3)". It is "" if no number is missing. Only columns of text files, and of JSON files
+        without NaN, have this text; for all other data it is "".
     """
 
     values: NDArray[np.float64]

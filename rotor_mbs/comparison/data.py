@@ -30,7 +30,7 @@ from rotor_mbs.solution.trajectory import Array
 # Bounds of the test whether numbers have a given number of significant digits. Up to _FEW_DIGITS
 # digits, the test is by arithmetic. For more digits, numbers are formatted as text, and each is
 # compared with the number in its text. Up to _SURE_DIGITS digits, the two may differ by
-# _ROUNDED_SINCE (relative). For more digits, they must be equal. If a difference were allowed there,
+# _ROUNDED_SINCE (relative). For more digits, they must be equal. If they could differ there,
 # numbers that are not rounded would pass, too (a third of them at 15 digits, nearly all at 16),
 # because the rounding to so many digits is hardly larger than _ROUNDED_SINCE. No double needs more
 # than _ALL_DIGITS.

@@ -54,7 +54,7 @@ from rotor_mbs.solution.metrics import horizon, horizon_samples
 from rotor_mbs.solution.status import OK_ERROR
 from rotor_mbs.solution.trajectory import Array, Trajectory
 
-# Times are rounded. A row is compared even if its time exceeds the scene's duration, by at most this
+# Times are rounded. A row is compared even if its time exceeds the scene's duration, by up to this
 # share of the duration.
 _TIME_ROUNDING = 1e-9
 _MIN_ROWS = 3  # fewer rows are too few to be compared
