@@ -14,7 +14,7 @@ from rotor_mbs.scenario.toml_file import file_path, parse_toml, shown_path
 if TYPE_CHECKING:  # `rotor-mbs list` reads no scene
     from rotor_mbs.scenario.scene import Scene, SceneChange, ValuesCheck
 
-# Names that no scene may have. `bench` and `stability` are tables of points in a results file;
+# Names that no scene may have. `runs`, `bench` and `stability` are tables in a results file;
 # `modes` and `comparison` are groups in other files. The remaining names are not groups now.
 RESERVED_GROUPS = (
     "bench",
@@ -22,6 +22,7 @@ RESERVED_GROUPS = (
     "comparison",
     "errata",
     "modes",
+    "runs",
     "stability",
     "summary",
     "sweep",

@@ -12,10 +12,12 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from rotor_mbs.errors import InputError
+from rotor_mbs.runs.design import RUNS
 from rotor_mbs.scenario.accuracy_bounds import Bound, read_bounds, shipped_bounds
 from rotor_mbs.scenario.catalogue import find_scenes
 from rotor_mbs.scenario.scene import load_scene
 from rotor_mbs.scenario.toml_file import MAX_BYTES
+from rotor_mbs.studies.bench import BENCH
 
 SCENE = """\
 title = "A good scene"
@@ -305,6 +307,15 @@ def test_arguments_that_name_no_scene(
     (problem,) = caught.value.problems
     assert message in problem
     assert problem.isprintable()
+
+
+@pytest.mark.parametrize("group", [RUNS, BENCH, "stability", "modes", "comparison"])
+def test_a_group_of_the_programs_files_is_no_name_of_a_scene(tmp_path: Path, group: str) -> None:
+    """A scene's group in a results file would be in the place of the table."""
+    path = tmp_path / f"{group}.toml"
+    path.write_text(SCENE, encoding="utf-8")
+    with pytest.raises(InputError, match=f"{group} is a reserved name in results files; allowed:"):
+        find_scenes([str(path)])
 
 
 def test_errors_of_all_arguments_and_files_at_once(tmp_path: Path) -> None:
